@@ -1,0 +1,138 @@
+#include "diffusion/training_data.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "diffusion/schedule.h"
+#include "diffusion/se3_noise.h"
+#include "stability/files.h"
+
+namespace dofusion {
+namespace {
+
+// Every vertex has its mirror image in y among the vertices.
+bool mirrors_in_y(const TriangleMesh& mesh) {
+  const double tolerance = 1e-6 * diameter(mesh);
+  return std::all_of(mesh.vertices.begin(), mesh.vertices.end(), [&](const Eigen::Vector3d& v) {
+    const Eigen::Vector3d image(v.x(), -v.y(), v.z());
+    return std::any_of(mesh.vertices.begin(), mesh.vertices.end(),
+                       [&](const Eigen::Vector3d& w) { return (w - image).norm() < tolerance; });
+  });
+}
+
+// The mirror image in the world's x of a shape that is its own mirror image in y, as a rigid pose.
+Pose mirrored(const Pose& pose) {
+  Pose result = Pose::Identity();
+  result.linear() = Eigen::Vector3d(-1, 1, 1).asDiagonal() * pose.linear() * Eigen::Vector3d(1, -1, 1).asDiagonal();
+  result.translation() = Eigen::Vector3d(-1, 1, 1).asDiagonal() * pose.translation();
+  return result;
+}
+
+}  // namespace
+
+TrainingSet::TrainingSet(std::vector<SceneDataset> datasets, const ModelConfig& config,
+                         const std::string& holdout_shape)
+    : config_(config) {
+  bool found_holdout = false;
+  for (SceneDataset& dataset : datasets) {
+    const int first = static_cast<int>(shapes_.size());
+    for (BaseShape& base : dataset.shapes) {
+      Shape shape;
+      shape.volume = volume(base.mesh);
+      shape.convex = is_convex(base.mesh);
+      const BoundingBox box = bounding_box(base.mesh);
+      shape.box_edges = box.max - box.min;
+      shape.box = shape.convex && std::abs(shape.volume / shape.box_edges.prod() - 1.0) < 1e-6;
+      shape.mirrors = shape.convex && mirrors_in_y(base.mesh);
+      shape.base = std::move(base);
+      shapes_.push_back(std::move(shape));
+    }
+    for (SceneRecord& record : dataset.scenes) {
+      bool held_out = false;
+      for (SceneObject& object : record.objects) {
+        if (!object.T_world_object.matrix().allFinite() || !object.scale.allFinite())
+          throw InputError("scene " + std::to_string(record.index) + " of the dataset has a pose that is not finite");
+        object.shape += first;
+        held_out = held_out || shapes_[object.shape].base.name == holdout_shape;
+      }
+      found_holdout = found_holdout || held_out;
+      if (!held_out && !record.objects.empty()) scenes_.push_back(std::move(record.objects));
+    }
+  }
+  if (!holdout_shape.empty() && !found_holdout)
+    throw InputError("--holdout-shape: no scene of the data contains '" + holdout_shape + "'");
+  if (scenes_.empty()) throw InputError("there is no scene to train on");
+}
+
+CloudShapePtr TrainingSet::cloud_shape(const Shape& shape, const Eigen::Vector3d& scale) const {
+  const TriangleMesh mesh = scaled(shape.base.mesh, scale);
+  if (!shape.convex) return std::make_shared<CloudShape>(*make_object(shape.base.name, mesh).object);
+  std::optional<Eigen::Vector3d> edges;
+  if (shape.box) edges = shape.box_edges.cwiseProduct(scale);
+  return std::make_shared<CloudShape>(mesh, edges);
+}
+
+void TrainingSet::append(std::uint64_t seed, std::uint64_t example, NetworkInput& batch,
+                         std::vector<float>& target) const {
+  Rng rng = make_rng(seed, example);
+  const auto& objects = scenes_[static_cast<std::size_t>(uniform_int(rng, 0, static_cast<int>(scenes_.size()) - 1))];
+  const int count = static_cast<int>(objects.size());
+  const int query = uniform_int(rng, 0, count - 1);
+  const Eigen::AngleAxisd yaw(uniform(rng, 0.0, 2.0 * M_PI), Eigen::Vector3d::UnitZ());
+  const bool mirror = uniform(rng) < 0.5 && std::all_of(objects.begin(), objects.end(), [&](const SceneObject& o) {
+    return shapes_[o.shape].mirrors;
+  });
+
+  std::vector<CloudShapePtr> shapes;
+  std::vector<Pose> poses;
+  std::vector<double> volumes;
+  for (const SceneObject& object : objects) {
+    const Shape& shape = shapes_[object.shape];
+    shapes.push_back(cloud_shape(shape, object.scale));
+    volumes.push_back(shape.volume * object.scale.prod());
+    const Pose pose = mirror ? mirrored(object.T_world_object) : object.T_world_object;
+    poses.push_back(Pose(yaw * pose));
+  }
+  const double length = normalised_length(volumes);
+  const double sigma = draw_sigma(config_, rng);
+  const Vector6 noise = noise6(rng, sigma);
+  const Pose clean = poses[query];
+  Vector6 wanted;
+  if (config_.preset == Preset::kPaper) {
+    poses[query] = add_body_noise(clean, noise, length);
+    wanted = noise / sigma;
+  } else {
+    poses[query] = add_world_noise(clean, noise, length);
+    wanted = world_residual(poses[query], clean, sigma, length);
+  }
+  append_input(config_, shapes, poses, query, length, sigma, Eigen::Vector2d::Zero(), config_.points, rng, batch);
+  for (int i = 0; i < 6; ++i) target.push_back(static_cast<float>(wanted[i]));
+}
+
+void append_input(const ModelConfig& config, const std::vector<CloudShapePtr>& shapes,
+                  const std::vector<Pose>& T_world_object, int query, double length, double sigma,
+                  const Eigen::Vector2d& origin, int points, Rng& rng, NetworkInput& batch) {
+  const bool paper = config.preset == Preset::kPaper;
+  const Pose& pose = T_world_object[query];
+  CloudOptions options;
+  options.points = points;
+  options.length = length;
+  options.distance_limit = config.distance_limit;
+  options.origin.head<2>() = paper ? origin : pose.translation().head<2>();
+  const std::size_t start = batch.cloud.size();
+  batch.points = points;
+  batch.cloud.resize(start + static_cast<std::size_t>(points) * 5);
+  make_augmented_cloud(shapes, T_world_object, query, options, rng, batch.cloud.data() + start);
+  if (paper) {
+    const Eigen::Vector3d position = (pose.translation() - options.origin) / length, turn = so3_log(pose.linear());
+    for (int i = 0; i < 3; ++i) batch.pose.push_back(static_cast<float>(position[i]));
+    for (int i = 0; i < 3; ++i) batch.pose.push_back(static_cast<float>(turn[i]));
+  } else {
+    for (int i = 0; i < 9; ++i) batch.pose.push_back(static_cast<float>(pose.linear()(i / 3, i % 3)));
+    batch.pose.push_back(static_cast<float>(pose.translation().z() / length));
+  }
+  batch.sigma.push_back(static_cast<float>(sigma));
+  ++batch.batch;
+}
+
+}  // namespace dofusion

@@ -1,0 +1,48 @@
+// Training examples drawn from datasets of stable scenes: a random object of a random scene becomes the query, the
+// scene is turned by a random yaw (and mirrored where the shapes allow it), the query's pose gets noise.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "diffusion/augmented_cloud.h"
+#include "diffusion/config.h"
+#include "diffusion/network.h"
+#include "stability/dataset.h"
+
+namespace dofusion {
+
+class TrainingSet {
+ public:
+  // Scenes with `holdout_shape` (if not empty) are left out. Throws InputError if that shape is in no dataset, if no
+  // scene is left, or if a pose is not finite.
+  TrainingSet(std::vector<SceneDataset> datasets, const ModelConfig& config, const std::string& holdout_shape = "");
+
+  std::size_t scenes() const { return scenes_.size(); }
+
+  // Example number `example` of the endless sequence that `seed` gives, appended to a batch and its targets.
+  void append(std::uint64_t seed, std::uint64_t example, NetworkInput& batch, std::vector<float>& target) const;
+
+ private:
+  struct Shape {
+    BaseShape base;
+    double volume = 0.0;
+    bool box = false, convex = true;
+    Eigen::Vector3d box_edges = Eigen::Vector3d::Zero();
+    bool mirrors = false;  // its own mirror image in y
+  };
+  CloudShapePtr cloud_shape(const Shape& shape, const Eigen::Vector3d& scale) const;
+
+  ModelConfig config_;
+  std::vector<Shape> shapes_;
+  std::vector<std::vector<SceneObject>> scenes_;  // with indices into shapes_
+};
+
+// One example's network input: the cloud of the scene with the query at its noisy pose, and pose features. `origin`:
+// where the paper's preset has its world origin (the default preset's is at the noisy query).
+void append_input(const ModelConfig& config, const std::vector<CloudShapePtr>& shapes,
+                  const std::vector<Pose>& T_world_object, int query, double length, double sigma,
+                  const Eigen::Vector2d& origin, int points, Rng& rng, NetworkInput& batch);
+
+}  // namespace dofusion

@@ -1,0 +1,143 @@
+#include "perception/candidate_search.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "perception/parallel_for.h"
+
+namespace dofusion {
+namespace {
+
+constexpr double kAlikeDistance = 0.003;  // metres
+constexpr double kAlikeAngle = 0.08;      // radians
+
+void sort_by_gain(std::vector<Candidate>& candidates) {
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.gain > b.gain; });
+}
+
+// The `count` best, no two alike, and the best `per_model` of every object even if they are not among them: what
+// looks worse while it is roughly placed may be the right one.
+std::vector<Candidate> best_distinct(std::vector<Candidate> candidates, const std::vector<ObjectModel>& models,
+                                     int count, int per_model) {
+  sort_by_gain(candidates);
+  std::vector<Candidate> kept;
+  std::vector<int> kept_of(models.size(), 0);
+  for (const Candidate& candidate : candidates) {
+    const int model = candidate.placed.model;
+    if (static_cast<int>(kept.size()) >= count && kept_of[model] >= per_model) continue;
+    const bool seen = std::any_of(kept.begin(), kept.end(), [&](const Candidate& other) {
+      return other.placed.model == model && other.placed.freedom == candidate.placed.freedom &&
+             alike(models[model], other.placed.T_world_object, candidate.placed.T_world_object, kAlikeDistance,
+                   kAlikeAngle);
+    });
+    if (seen) continue;
+    kept.push_back(candidate);
+    ++kept_of[model];
+  }
+  return kept;
+}
+
+// One scorer a thread, on one level.
+struct Level {
+  Level(const Observation& observation, const Explanation& scene_, int threads) : scene(&scene_) {
+    for (int i = 0; i < threads; ++i) scorers.emplace_back(observation);
+  }
+  const Explanation* scene;
+  std::vector<PoseScorer> scorers;
+};
+
+// Applies improve(worker, candidate) to every candidate.
+template <class Improve>
+void improve_all(std::vector<Candidate>& candidates, int threads, const Improve& improve) {
+  parallel_for(static_cast<int>(candidates.size()), threads,
+               [&](int worker, int i) { improve(worker, candidates[i]); });
+}
+
+void align_and_climb(const std::vector<ObjectModel>& models, Level& level, int worker, const AlignOptions& align,
+                     const ClimbOptions& climbing, Candidate& candidate) {
+  const ObjectModel& model = models[candidate.placed.model];
+  const TriangleMesh& mesh = model.object->mesh;
+  PoseScorer& scorer = level.scorers[worker];
+  const PoseObjective gain = [&](const Pose& pose) { return scorer.gain(*level.scene, mesh, pose); };
+  PlacedObject& placed = candidate.placed;
+  const Pose aligned =
+      align_to_readings(scorer, *level.scene, mesh, placed.T_world_object, placed.freedom, align);
+  const Pose start = gain(aligned) > gain(placed.T_world_object) ? aligned : placed.T_world_object;
+  const ScoredPose climbed = climb(gain, start, placed.freedom, model.radius, climbing);
+  placed.T_world_object = climbed.T_world_object;
+  candidate.gain = climbed.score;
+}
+
+}  // namespace
+
+ObservationPyramid observe_pyramid(const DepthImage& depth, const Camera& camera, const Table& table,
+                                   const LabelImage& labels, const PixelWindow& window, const DepthSigma& sigma,
+                                   int coarse_stride) {
+  const auto level = [&](int stride, double extra_sigma) {
+    PixelWindow at = window;
+    at.stride = std::max(1, stride);
+    DepthSigma lenient = sigma;
+    lenient.constant += extra_sigma;
+    return observe(depth, camera, table, labels, at, lenient);
+  };
+  return {level(coarse_stride, 0.005), level((coarse_stride + 1) / 2, 0.0015), level(1, 0.0)};
+}
+
+PyramidScene explain(const ObservationPyramid& pyramid, const std::vector<ObjectModel>& models,
+                     const std::vector<PlacedObject>& placed) {
+  const auto on_level = [&](const Observation& observation) {
+    PoseScorer scorer(observation);
+    Explanation scene = scorer.empty_scene();
+    for (const PlacedObject& object : placed) {
+      scorer.add(models[object.model].object->mesh, object.T_world_object, scene);
+    }
+    return scene;
+  };
+  return {on_level(pyramid.coarse), on_level(pyramid.medium), on_level(pyramid.fine)};
+}
+
+std::vector<Candidate> find_candidates(const std::vector<ObjectModel>& models, const ObservationPyramid& pyramid,
+                                       const PyramidScene& scene, const Target& target, const Camera& camera,
+                                       const Pose& T_world_camera, const std::vector<double>& heights,
+                                       const CandidateOptions& options) {
+  std::vector<PoseHypothesis> hypotheses;
+  const HypothesisOptions guessing;
+  add_resting_hypotheses(models, target, camera, T_world_camera, heights, guessing, hypotheses);
+  add_face_hypotheses(models, target, guessing, hypotheses);
+  add_face_pair_hypotheses(models, target, guessing, hypotheses);
+
+  std::vector<Candidate> candidates;
+  for (const PoseHypothesis& guess : hypotheses) {
+    candidates.push_back({{guess.model, guess.T_world_object, guess.freedom}, 0.0});
+  }
+  Level coarse(pyramid.coarse, scene.coarse, options.threads), medium(pyramid.medium, scene.medium, options.threads),
+      fine(pyramid.fine, scene.fine, options.threads);
+  improve_all(candidates, options.threads, [&](int worker, Candidate& candidate) {
+    candidate.gain = coarse.scorers[worker].gain(*coarse.scene, models[candidate.placed.model].object->mesh,
+                                                 candidate.placed.T_world_object);
+  });
+  candidates = best_distinct(std::move(candidates), models, options.coarse_kept, options.coarse_kept / 16);
+  improve_all(candidates, options.threads, [&](int worker, Candidate& candidate) {
+    align_and_climb(models, coarse, worker, {3, 0.02, 0.01}, {0.004, 0.002, 1}, candidate);
+  });
+  candidates = best_distinct(std::move(candidates), models, options.medium_kept, options.medium_kept / 16);
+  improve_all(candidates, options.threads, [&](int worker, Candidate& candidate) {
+    align_and_climb(models, medium, worker, {3, 0.012, 0.006}, {0.002, 0.001, 2}, candidate);
+  });
+  candidates = best_distinct(std::move(candidates), models, options.fine_kept, 1);
+  improve_all(candidates, options.threads, [&](int worker, Candidate& candidate) {
+    align_and_climb(models, fine, worker, {2, 0.008, 0.006}, {0.001, 0.0005, 2}, candidate);
+  });
+  return best_distinct(std::move(candidates), models, options.fine_kept, 0);
+}
+
+bool alike(const ObjectModel& model, const Pose& a, const Pose& b, double distance, double angle) {
+  if ((a.translation() - b.translation()).norm() > distance) return false;
+  const Eigen::Matrix3d R = a.linear().transpose() * b.linear();
+  return std::any_of(model.symmetries.begin(), model.symmetries.end(), [&](const Eigen::Matrix3d& symmetry) {
+    return rotation_angle(R * symmetry) < angle;
+  });
+}
+
+}  // namespace dofusion

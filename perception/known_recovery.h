@@ -1,0 +1,40 @@
+// Which objects of a library stand on the table, and where: recovery with known shapes.
+#pragma once
+
+#include <vector>
+
+#include "perception/recovery.h"
+#include "perception/table.h"
+
+namespace dofusion {
+
+struct KnownRecoveryOptions {
+  int threads = 1;
+  DepthSigma sigma;               // of the readings; scaled to what the table's own readings scatter
+  double cluster_distance = 0.05; // metres between readings of objects that are searched for jointly
+  int beam = 3;                   // partial scenes of a cluster that are kept
+  int fewest_pixels = 40;         // that an object must show
+  double min_score = 0.6;         // share of its visible pixels that an object must explain to be believed
+  bool settle = true;             // let the recovered scene come to rest in physics
+  double settle_distance = 0.006; // metres, and
+  double settle_angle = 0.1;      // radians that settling may move an object; else its seen pose is kept
+};
+
+// For every object seen, the library's object and the pose that explain the image best. Poses are hypothesised from
+// the faces seen and from the ways objects rest, rendered and compared, aligned to the readings, and chosen jointly
+// for objects that touch or hide each other, so that one label may hold several objects and several labels one. The
+// scene is then settled in physics: objects lie exactly on what supports them. What no object of the library explains
+// is left out, with its label unused. The result is sorted by label, then by pixels; `pixels` counts the
+// readings the object explains and `score` is their share of the visible pixels with a reading. An empty list if
+// there is no label above 1. Throws std::invalid_argument if an image is not of the camera's size or the library is
+// empty.
+std::vector<RecoveredObject> recover_known(const DepthImage& depth, const Camera& camera, const Table& table,
+                                           const LabelImage& labels, const std::vector<ObjectPtr>& library,
+                                           const KnownRecoveryOptions& options = {});
+
+// Labels in the order of the recovered objects (2 + i for object i) where the image shows them: clusters that hold
+// several objects are split, parts of one object joined. Labels of objects that were not recovered become 0.
+LabelImage label_recovered(const DepthImage& depth, const Camera& camera, const Table& table,
+                           const LabelImage& labels, const std::vector<RecoveredObject>& objects);
+
+}  // namespace dofusion

@@ -1,0 +1,139 @@
+#include "perception/picture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <vector>
+
+#include "perception/png.h"
+#include "stability/files.h"
+
+namespace dofusion {
+namespace {
+
+constexpr std::array<Rgb, 10> kPalette{{{66, 120, 190},
+                                        {84, 166, 92},
+                                        {148, 103, 189},
+                                        {222, 190, 60},
+                                        {60, 175, 180},
+                                        {200, 90, 120},
+                                        {140, 110, 85},
+                                        {120, 150, 60},
+                                        {100, 110, 140},
+                                        {225, 150, 190}}};
+constexpr Rgb kTableColour{205, 205, 202};
+constexpr Rgb kNothingColour{0, 0, 0};
+
+Rgb label_colour(std::uint8_t label) {
+  if (label == kLabelNothing) return kNothingColour;
+  return label == kLabelTable ? kTableColour : object_colour(label - kLabelFirstObject);
+}
+
+Rgb scaled_colour(const Rgb& colour, double factor) {
+  Rgb result;
+  for (int k = 0; k < 3; ++k)
+    result[k] = static_cast<std::uint8_t>(std::clamp(std::lround(colour[k] * factor), 0L, 255L));
+  return result;
+}
+
+// Google's Turbo colour map (Mikhailov 2019) by its polynomial approximation; t in [0, 1].
+Rgb turbo(double t) {
+  const auto polynomial = [t](std::array<double, 6> c) {
+    double value = 0.0;
+    for (int k = 5; k >= 0; --k) value = value * t + c[k];
+    return static_cast<std::uint8_t>(std::clamp(std::lround(255.0 * value), 0L, 255L));
+  };
+  return {polynomial({0.13572138, 4.61539260, -42.66032258, 132.13108234, -152.94239396, 59.28637943}),
+          polynomial({0.09140261, 2.19418839, 4.84296658, -14.18503333, 4.27729857, 2.82956604}),
+          polynomial({0.10667330, 12.64194608, -60.58204836, 110.36276771, -89.90310912, 27.34824973})};
+}
+
+// Shading in [0, 1] of the surface seen at a pixel by a headlight, from depth differences a few pixels wide.
+double headlight(const DepthImage& depth, const Camera& camera, int row, int column) {
+  constexpr int kReach = 3;          // pixels; evens out the noise
+  constexpr double kLargestStep = 0.02;  // metres; more is another surface
+  constexpr double kUnknown = 0.8;
+  const double z = depth.at(row, column);
+  const auto difference = [&](int down, int right) -> std::optional<Eigen::Vector3d> {
+    std::array<Eigen::Vector3d, 2> ends;
+    for (int k = 0; k < 2; ++k) {
+      const int sign = k == 0 ? -1 : 1;
+      int r = row + sign * down, c = column + sign * right;
+      const bool usable = depth.contains(r, c) && depth.at(r, c) > 0.0f && std::abs(depth.at(r, c) - z) < kLargestStep;
+      if (!usable) r = row, c = column;
+      ends[static_cast<std::size_t>(k)] = unproject(camera, c, r, depth.at(r, c));
+    }
+    if (ends[0] == ends[1]) return std::nullopt;
+    return ends[1] - ends[0];
+  };
+  const auto across = difference(0, kReach), along = difference(kReach, 0);
+  if (!across || !along) return kUnknown;
+  const Eigen::Vector3d ray = unproject(camera, column, row, 1.0);
+  return std::abs(across->cross(*along).normalized().dot(ray.normalized()));
+}
+
+}  // namespace
+
+Rgb object_colour(int index) {
+  const Rgb colour = kPalette[static_cast<std::size_t>(index) % kPalette.size()];
+  // Later rounds of the palette are darker.
+  return scaled_colour(colour, std::pow(0.8, static_cast<double>(index / static_cast<int>(kPalette.size()))));
+}
+
+ColourImage depth_picture(const DepthImage& depth) {
+  ColourImage picture(depth.width, depth.height, kNothingColour);
+  std::vector<float> readings;
+  std::copy_if(depth.pixels.begin(), depth.pixels.end(), std::back_inserter(readings), [](float z) { return z > 0; });
+  if (readings.empty()) return picture;
+  const auto percentile = [&](double share) {
+    const auto at = readings.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(readings.size() - 1));
+    std::nth_element(readings.begin(), at, readings.end());
+    return static_cast<double>(*at);
+  };
+  const double near = percentile(0.01), far = percentile(0.99);
+  const double range = std::max(far - near, 1e-6);
+  for (std::size_t i = 0; i < depth.pixels.size(); ++i) {
+    if (depth.pixels[i] > 0.0f) picture.pixels[i] = turbo(std::clamp((far - depth.pixels[i]) / range, 0.0, 1.0));
+  }
+  return picture;
+}
+
+ColourImage segmentation_picture(const LabelImage& labels, const DepthImage& depth, const Camera& camera) {
+  if (labels.width != depth.width || labels.height != depth.height)
+    throw std::invalid_argument("labels of " + std::to_string(labels.width) + "x" + std::to_string(labels.height) +
+                                " pixels for a depth image of " + std::to_string(depth.width) + "x" +
+                                std::to_string(depth.height));
+  constexpr double kAmbient = 0.35;
+  ColourImage picture(labels.width, labels.height);
+  for (int row = 0; row < labels.height; ++row)
+    for (int column = 0; column < labels.width; ++column) {
+      const std::uint8_t label = labels.at(row, column);
+      if (label == kLabelNothing && depth.at(row, column) > 0.0f) {
+        picture.at(row, column) = scaled_colour({90, 90, 95}, headlight(depth, camera, row, column));
+        continue;
+      }
+      const double light = depth.at(row, column) > 0.0f ? headlight(depth, camera, row, column) : 0.0;
+      picture.at(row, column) = scaled_colour(label_colour(label), kAmbient + (1.0 - kAmbient) * light);
+    }
+  return picture;
+}
+
+Camera resized(const Camera& camera, double factor) {
+  Camera result = camera;
+  result.width = std::max(1, static_cast<int>(std::lround(camera.width * factor)));
+  result.height = std::max(1, static_cast<int>(std::lround(camera.height * factor)));
+  result.fx *= factor;
+  result.fy *= factor;
+  // Pixel centres are at integers: the image begins at -0.5.
+  result.cx = (camera.cx + 0.5) * factor - 0.5;
+  result.cy = (camera.cy + 0.5) * factor - 0.5;
+  return result;
+}
+
+std::string to_png(const ColourImage& image) {
+  return encode_rgb_png(image.pixels.front().data(), image.width, image.height);
+}
+
+void write_picture(const ColourImage& image, const std::string& path) { write_file(path, to_png(image)); }
+
+}  // namespace dofusion

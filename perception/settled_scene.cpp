@@ -1,0 +1,71 @@
+#include "perception/settled_scene.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "stability/physics.h"
+
+namespace dofusion {
+namespace {
+
+constexpr double kFallsOver = 150.0;   // nats: handicap of a scene that does not stand
+constexpr double kWorsePerPixel = 0.1; // nats that settling may cost for each pixel an object shows
+
+int visible_pixels(const std::vector<ObjectModel>& models, const Cluster& cluster,
+                   const std::vector<PlacedObject>& objects) {
+  PoseScorer scorer(cluster.pyramid.fine);
+  const Explanation empty = scorer.empty_scene();
+  int sum = 0;
+  for (const PlacedObject& object : objects) {
+    sum += scorer.count(empty, models[object.model].object->mesh, object.T_world_object).explained;
+  }
+  return sum;
+}
+
+struct Settled {
+  SceneHypothesis scene;
+  bool stands = false;
+};
+
+Settled settle(const std::vector<ObjectModel>& models, const Cluster& cluster, const SceneHypothesis& scene,
+               const SceneSearchOptions& options, const SettleLimits& limits) {
+  std::vector<ObjectPtr> objects;
+  std::vector<Pose> poses;
+  for (const PlacedObject& object : scene.objects) {
+    objects.push_back(models[object.model].object);
+    poses.push_back(object.T_world_object);
+  }
+  const SettleResult result = Simulator(objects).settle(poses);
+  Settled settled{scene, result.status == SettleStatus::kSettled};
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const Pose moved_by = poses[i].inverse() * result.T_world_object[i];
+    if (moved_by.translation().norm() > limits.distance || rotation_angle(moved_by.linear()) > limits.angle) {
+      settled.stands = false;
+    }
+    settled.scene.objects[i].T_world_object = result.T_world_object[i];
+  }
+  settled.scene.score = scene_score(models, cluster, settled.scene.objects, true, options);
+  return settled;
+}
+
+}  // namespace
+
+SceneHypothesis choose_settled(const std::vector<ObjectModel>& models, const Cluster& cluster,
+                               const std::vector<SceneHypothesis>& scenes, const SceneSearchOptions& options,
+                               const SettleLimits& limits) {
+  SceneHypothesis best = scenes.front();
+  double best_score = -1e300;
+  for (const SceneHypothesis& seen : scenes) {
+    if (seen.objects.empty()) continue;
+    const Settled settled = settle(models, cluster, seen, options, limits);
+    const double allowed = kWorsePerPixel * visible_pixels(models, cluster, seen.objects);
+    const bool accept = settled.stands && settled.scene.score >= seen.score - allowed;
+    const double score = accept ? std::max(seen.score, settled.scene.score) : seen.score - kFallsOver;
+    if (score <= best_score) continue;
+    best_score = score;
+    best = accept ? settled.scene : seen;
+  }
+  return best;
+}
+
+}  // namespace dofusion

@@ -1,0 +1,49 @@
+#include "perception/synthetic_view.h"
+
+#include <cmath>
+#include <stdexcept>
+
+namespace dofusion {
+
+namespace {
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kDegree = kPi / 180.0;
+}  // namespace
+
+Camera default_camera() { return {600.0, 600.0, 319.5, 239.5, 640, 480, 0.1}; }
+
+Pose sample_viewpoint(const Eigen::Vector3d& target, const ViewpointOptions& options, Rng& rng) {
+  if (!(options.distance > 0.0) || !(options.min_elevation_deg >= 0.0) ||
+      !(options.min_elevation_deg <= options.max_elevation_deg) || !(options.max_elevation_deg < 90.0))
+    throw std::invalid_argument("a viewpoint needs a positive distance and 0 <= min_elevation <= max_elevation < 90");
+  // The area of a zone of the sphere is proportional to its height.
+  const double height = uniform(rng, std::sin(options.min_elevation_deg * kDegree),
+                                std::sin(options.max_elevation_deg * kDegree));
+  const double azimuth = uniform(rng, -kPi, kPi);
+  const double radius = std::sqrt(1.0 - height * height);
+  const Eigen::Vector3d direction(radius * std::cos(azimuth), radius * std::sin(azimuth), height);
+  return look_at(target + options.distance * direction, target);
+}
+
+Eigen::Vector3d scene_centre(const Scene& scene) {
+  TriangleMesh all;
+  for (std::size_t i = 0; i < scene.objects.size(); ++i)
+    for (const Eigen::Vector3d& vertex : scene.objects[i]->mesh.vertices)
+      all.vertices.push_back(scene.T_world_object[i] * vertex);
+  if (all.vertices.empty()) return Eigen::Vector3d::Zero();
+  const BoundingBox box = bounding_box(all);
+  return 0.5 * (box.min + box.max);
+}
+
+SyntheticView make_synthetic_view(const Scene& scene, const Camera& camera, const SyntheticViewOptions& options,
+                                  Rng& rng) {
+  Scanner scanner(scene.objects);
+  scanner.set_poses(scene.T_world_object);
+  SyntheticView view;
+  view.T_world_camera = sample_viewpoint(scene_centre(scene), options.viewpoint, rng);
+  view.truth = scanner.render(camera, view.T_world_camera);
+  view.depth = apply_sensor_noise(view.truth, camera, options.sensor, options.noise_scale, rng);
+  return view;
+}
+
+}  // namespace dofusion

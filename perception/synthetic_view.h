@@ -1,0 +1,45 @@
+// One synthetic depth image of a scene: a viewpoint, an exact scan, the sensor's noise.
+#pragma once
+
+#include "perception/camera.h"
+#include "perception/scanner.h"
+#include "perception/sensor_noise.h"
+#include "stability/random.h"
+#include "stability/scene.h"
+
+namespace dofusion {
+
+// 640 x 480, 56 degrees wide, depth in steps of 0.1 mm.
+Camera default_camera();
+
+struct ViewpointOptions {
+  double distance = 0.7;            // metres from the target
+  double min_elevation_deg = 30.0;  // above the table
+  double max_elevation_deg = 60.0;
+};
+
+// T_world_camera of a camera that looks at `target` from a random azimuth and elevation (uniform over the part of
+// the sphere between the two elevations), upright. Throws std::invalid_argument unless the distance is positive and
+// 0 <= min <= max < 90.
+Pose sample_viewpoint(const Eigen::Vector3d& target, const ViewpointOptions& options, Rng& rng);
+
+// Centre of the box around all the scene's objects; the origin if there is none.
+Eigen::Vector3d scene_centre(const Scene& scene);
+
+struct SyntheticViewOptions {
+  ViewpointOptions viewpoint;
+  SensorModel sensor = SensorModel::kRealsense;
+  double noise_scale = 1.0;
+};
+
+struct SyntheticView {
+  Pose T_world_camera = Pose::Identity();
+  Scan truth;        // exact depth, labels in the order of the scene's objects, normals
+  DepthImage depth;  // what the sensor reads
+};
+
+// Looks at the scene's centre from a random viewpoint.
+SyntheticView make_synthetic_view(const Scene& scene, const Camera& camera, const SyntheticViewOptions& options,
+                                  Rng& rng);
+
+}  // namespace dofusion

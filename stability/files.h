@@ -1,0 +1,38 @@
+// Outputs that are whole or absent: files are written under a temporary name and renamed.
+#pragma once
+
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+
+namespace dofusion {
+
+// Bad input from the user: the message names the file or the argument, what is wrong, and what to do. Programs end
+// with this line on stderr and exit status 2.
+class InputError : public std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+// The file's bytes. Throws InputError naming the file if it cannot be read.
+std::string read_file(const std::filesystem::path& path);
+
+// Writes `bytes` under a temporary name beside `path` and renames it. Throws InputError if that is not possible.
+void write_file(const std::filesystem::path& path, const std::string& bytes);
+
+// A directory of results that appears whole: fill `path()`, then `commit()` moves it to the target. Where the target
+// exists already, entries of the same name are replaced and others are left alone. Without commit the temporary
+// directory is removed. The constructor throws InputError if the target cannot be written or is a file.
+class OutputDirectory {
+ public:
+  explicit OutputDirectory(const std::filesystem::path& target);
+  ~OutputDirectory();
+  OutputDirectory(const OutputDirectory&) = delete;
+  OutputDirectory& operator=(const OutputDirectory&) = delete;
+  const std::filesystem::path& path() const { return temporary_; }
+  void commit();
+
+ private:
+  std::filesystem::path target_, temporary_;
+};
+
+}  // namespace dofusion

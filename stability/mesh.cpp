@@ -1,0 +1,171 @@
+#include "stability/mesh.h"
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <stdexcept>
+
+#include <Eigen/Geometry>
+
+namespace dofusion {
+namespace {
+
+// For every vertex the first vertex at the same position.
+std::vector<int> position_ids(const TriangleMesh& mesh) {
+  std::map<std::array<double, 3>, int> first;
+  std::vector<int> ids;
+  ids.reserve(mesh.vertices.size());
+  for (const Eigen::Vector3d& v : mesh.vertices) {
+    // + 0.0 turns -0.0 into 0.0, which compare equal but might be written apart.
+    ids.push_back(first.emplace(std::array<double, 3>{v.x() + 0.0, v.y() + 0.0, v.z() + 0.0},
+                                static_cast<int>(ids.size()))
+                      .first->second);
+  }
+  return ids;
+}
+
+Eigen::Vector3d area_vector(const TriangleMesh& mesh, const Eigen::Vector3i& t) {
+  const Eigen::Vector3d& a = mesh.vertices[t[0]];
+  return 0.5 * (mesh.vertices[t[1]] - a).cross(mesh.vertices[t[2]] - a);
+}
+
+}  // namespace
+
+double volume(const TriangleMesh& mesh) {
+  double six_volumes = 0.0;
+  for (const Eigen::Vector3i& t : mesh.triangles) {
+    six_volumes += mesh.vertices[t[0]].dot(mesh.vertices[t[1]].cross(mesh.vertices[t[2]]));
+  }
+  return six_volumes / 6.0;
+}
+
+Eigen::Vector3d centre_of_mass(const TriangleMesh& mesh) {
+  if (mesh.vertices.empty()) throw std::invalid_argument("centre of mass of an empty mesh");
+  // Signed tetrahedra over the first vertex rather than the origin: exact for meshes far from it as well.
+  const Eigen::Vector3d reference = mesh.vertices.front();
+  double total = 0.0;
+  Eigen::Vector3d moment = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3i& t : mesh.triangles) {
+    const Eigen::Vector3d a = mesh.vertices[t[0]] - reference, b = mesh.vertices[t[1]] - reference,
+                          c = mesh.vertices[t[2]] - reference;
+    const double six_volumes = a.dot(b.cross(c));
+    total += six_volumes;
+    moment += six_volumes * (a + b + c) / 4.0;
+  }
+  if (!(std::abs(total) > 0.0)) throw std::invalid_argument("centre of mass of a mesh without volume");
+  return reference + moment / total;
+}
+
+double diameter(const TriangleMesh& mesh) {
+  double squared = 0.0;
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    for (std::size_t j = i + 1; j < mesh.vertices.size(); ++j) {
+      squared = std::max(squared, (mesh.vertices[i] - mesh.vertices[j]).squaredNorm());
+    }
+  }
+  return std::sqrt(squared);
+}
+
+BoundingBox bounding_box(const TriangleMesh& mesh) {
+  if (mesh.vertices.empty()) throw std::invalid_argument("bounding box of an empty mesh");
+  BoundingBox box{mesh.vertices.front(), mesh.vertices.front()};
+  for (const Eigen::Vector3d& v : mesh.vertices) {
+    box.min = box.min.cwiseMin(v);
+    box.max = box.max.cwiseMax(v);
+  }
+  return box;
+}
+
+double surface_area(const TriangleMesh& mesh) {
+  double area = 0.0;
+  for (const Eigen::Vector3i& t : mesh.triangles) area += area_vector(mesh, t).norm();
+  return area;
+}
+
+bool is_closed(const TriangleMesh& mesh) {
+  if (mesh.triangles.empty()) return false;
+  const std::vector<int> ids = position_ids(mesh);
+  std::map<std::pair<int, int>, int> directed_edges;
+  for (const Eigen::Vector3i& t : mesh.triangles) {
+    for (int e = 0; e < 3; ++e) {
+      const int from = ids[t[e]], to = ids[t[(e + 1) % 3]];
+      if (from == to) return false;
+      if (++directed_edges[{from, to}] > 1) return false;
+    }
+  }
+  return std::all_of(directed_edges.begin(), directed_edges.end(), [&](const auto& edge) {
+    return directed_edges.count({edge.first.second, edge.first.first}) == 1;
+  });
+}
+
+bool is_convex(const TriangleMesh& mesh, double tolerance) {
+  const BoundingBox box = mesh.vertices.empty() ? BoundingBox{} : bounding_box(mesh);
+  const double allowed = tolerance * (box.max - box.min).norm();
+  for (const Eigen::Vector3i& t : mesh.triangles) {
+    const Eigen::Vector3d normal = area_vector(mesh, t).normalized();
+    const double offset = normal.dot(mesh.vertices[t[0]]);
+    for (const Eigen::Vector3d& v : mesh.vertices) {
+      if (normal.dot(v) - offset > allowed) return false;
+    }
+  }
+  return true;
+}
+
+TriangleMesh weld(const TriangleMesh& mesh) {
+  const std::vector<int> ids = position_ids(mesh);
+  std::vector<int> new_index(mesh.vertices.size(), -1);
+  TriangleMesh welded;
+  for (const Eigen::Vector3i& t : mesh.triangles) {
+    const Eigen::Vector3i merged(ids[t[0]], ids[t[1]], ids[t[2]]);
+    if (merged[0] == merged[1] || merged[1] == merged[2] || merged[2] == merged[0]) continue;
+    Eigen::Vector3i triangle;
+    for (int k = 0; k < 3; ++k) {
+      int& index = new_index[merged[k]];
+      if (index < 0) {
+        index = static_cast<int>(welded.vertices.size());
+        welded.vertices.push_back(mesh.vertices[merged[k]]);
+      }
+      triangle[k] = index;
+    }
+    welded.triangles.push_back(triangle);
+  }
+  return welded;
+}
+
+TriangleMesh translated(TriangleMesh mesh, const Eigen::Vector3d& t) {
+  for (Eigen::Vector3d& v : mesh.vertices) v += t;
+  return mesh;
+}
+
+TriangleMesh scaled(TriangleMesh mesh, const Eigen::Vector3d& factors) {
+  for (Eigen::Vector3d& v : mesh.vertices) v = v.cwiseProduct(factors);
+  return mesh;
+}
+
+std::vector<SurfaceSample> sample_surface(const TriangleMesh& mesh, int count, Rng& rng) {
+  std::vector<double> cumulative_area;
+  cumulative_area.reserve(mesh.triangles.size());
+  double total = 0.0;
+  for (const Eigen::Vector3i& t : mesh.triangles) cumulative_area.push_back(total += area_vector(mesh, t).norm());
+  if (!(total > 0.0)) throw std::invalid_argument("sampling a mesh without surface");
+
+  std::vector<SurfaceSample> samples;
+  samples.reserve(static_cast<std::size_t>(count));
+  for (int i = 0; i < count; ++i) {
+    const double area = uniform(rng, 0.0, total);
+    const auto at = std::upper_bound(cumulative_area.begin(), cumulative_area.end(), area);
+    const Eigen::Vector3i& t =
+        mesh.triangles[std::min<std::size_t>(at - cumulative_area.begin(), mesh.triangles.size() - 1)];
+    double u = uniform(rng), v = uniform(rng);
+    if (u + v > 1.0) {
+      u = 1.0 - u;
+      v = 1.0 - v;
+    }
+    const Eigen::Vector3d& a = mesh.vertices[t[0]];
+    samples.push_back({a + u * (mesh.vertices[t[1]] - a) + v * (mesh.vertices[t[2]] - a),
+                       area_vector(mesh, t).normalized()});
+  }
+  return samples;
+}
+
+}  // namespace dofusion

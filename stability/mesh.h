@@ -1,0 +1,51 @@
+// Triangle meshes and what follows exactly from them.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "stability/random.h"
+
+namespace dofusion {
+
+// Triangles wind counter-clockwise seen from outside.
+struct TriangleMesh {
+  std::vector<Eigen::Vector3d> vertices;   // (V) metres
+  std::vector<Eigen::Vector3i> triangles;  // (T) indices into vertices
+};
+
+struct BoundingBox {
+  Eigen::Vector3d min = Eigen::Vector3d::Zero();
+  Eigen::Vector3d max = Eigen::Vector3d::Zero();
+};
+
+double volume(const TriangleMesh& mesh);               // signed: negative if the mesh is inside out
+Eigen::Vector3d centre_of_mass(const TriangleMesh&);   // of the uniform solid; the mesh must have a volume
+double diameter(const TriangleMesh& mesh);             // largest distance between two vertices
+BoundingBox bounding_box(const TriangleMesh& mesh);    // throws std::invalid_argument without vertices
+double surface_area(const TriangleMesh& mesh);
+
+// Every edge shared by exactly two triangles that run through it in opposite directions (vertices are compared by
+// position, so that a mesh with one vertex per corner and face, as STL has, counts as closed).
+bool is_closed(const TriangleMesh& mesh);
+
+// No vertex lies more than `tolerance` times the diameter before the plane of any face.
+bool is_convex(const TriangleMesh& mesh, double tolerance = 1e-4);
+
+// Merges vertices at the same position and drops triangles without area.
+TriangleMesh weld(const TriangleMesh& mesh);
+
+TriangleMesh translated(TriangleMesh mesh, const Eigen::Vector3d& t);
+TriangleMesh scaled(TriangleMesh mesh, const Eigen::Vector3d& factors);  // factors > 0, per axis
+
+struct SurfaceSample {
+  Eigen::Vector3d point;
+  Eigen::Vector3d normal;  // outward, of the triangle
+};
+
+// `count` points drawn uniformly over the surface.
+std::vector<SurfaceSample> sample_surface(const TriangleMesh& mesh, int count, Rng& rng);
+
+}  // namespace dofusion

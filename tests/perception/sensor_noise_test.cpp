@@ -1,0 +1,271 @@
+#include "perception/sensor_noise.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace dofusion {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kDegree = kPi / 180.0;
+
+const Camera kCamera{600.0, 600.0, 99.5, 99.5, 200, 200, 0.1};
+constexpr int kPixels = 200 * 200;
+
+// The scan of a plane through the optical axis at `depth`, tilted by `tilt` radians about the image's y axis.
+Scan plane_scan(double depth, double tilt = 0.0) {
+  Scan scan{DepthImage(200, 200), LabelImage(200, 200, kLabelTable), NormalImage(200, 200, Eigen::Vector3f::Zero())};
+  const Eigen::Vector3d normal(std::sin(tilt), 0.0, -std::cos(tilt));
+  for (int v = 0; v < 200; ++v)
+    for (int u = 0; u < 200; ++u) {
+      const Eigen::Vector3d ray = unproject(kCamera, u, v, 1.0);
+      scan.depth.at(v, u) = static_cast<float>(-std::cos(tilt) * depth / normal.dot(ray));
+      scan.normals.at(v, u) = normal.cast<float>();
+    }
+  return scan;
+}
+
+// Two planes that face the camera, the left half of the image at `near`, the right one at `far`.
+Scan step_scan(double near, double far) {
+  Scan scan = plane_scan(far);
+  for (int v = 0; v < 200; ++v)
+    for (int u = 0; u < 100; ++u) scan.depth.at(v, u) = static_cast<float>(near);
+  return scan;
+}
+
+struct Errors {
+  double mean = 0.0, sigma = 0.0;  // metres, of the readings
+  int missing = 0;                 // pixels
+};
+
+Errors errors(const DepthImage& noisy, const Scan& scan) {
+  Errors e;
+  double sum = 0.0, squares = 0.0;
+  int n = 0;
+  for (std::size_t i = 0; i < noisy.pixels.size(); ++i) {
+    if (noisy.pixels[i] == 0.0f) {
+      ++e.missing;
+      continue;
+    }
+    const double error = static_cast<double>(noisy.pixels[i]) - scan.depth.pixels[i];
+    sum += error;
+    squares += error * error;
+    ++n;
+  }
+  e.mean = sum / n;
+  e.sigma = std::sqrt(squares / n - e.mean * e.mean);
+  return e;
+}
+
+Errors plane_errors(SensorModel sensor, double scale, double depth) {
+  const Scan scan = plane_scan(depth);
+  Rng rng = make_rng(7);
+  return errors(apply_sensor_noise(scan, kCamera, sensor, scale, rng), scan);
+}
+
+// A standard deviation from n draws is known to 1 / sqrt(2 n) of itself, a mean to sigma / sqrt(n): five times that.
+constexpr double kSigmaTolerance = 5.0 / 283.0;  // sqrt(2 * 40000) = 283
+constexpr double kMeanTolerance = 5.0 / 200.0;   // sqrt(40000) = 200
+
+// Five standard deviations of a count with probability p in n.
+double count_tolerance(double p, int n) { return 5.0 * std::sqrt(n * p * (1.0 - p)); }
+
+TEST(SensorNoise, RealsenseFollowsIntelsFormula) {
+  EXPECT_NEAR(realsense_sigma(0.7, 0.0), 0.00185, 0.5e-5);  // as the tuning guide's calculation gives
+  for (const double depth : {0.4, 0.7, 1.5}) {
+    const double expected = depth * depth * 0.08 / (424.0 * 0.05);
+    const Errors e = plane_errors(SensorModel::kRealsense, 1.0, depth);
+    EXPECT_NEAR(e.sigma / expected, 1.0, kSigmaTolerance) << depth;
+    EXPECT_NEAR(e.mean / expected, 0.0, kMeanTolerance) << depth;
+    EXPECT_EQ(e.missing, 0) << depth;
+  }
+}
+
+TEST(SensorNoise, ScaleMultipliesTheSigma) {
+  for (const double scale : {0.5, 2.0, 4.0}) {
+    const Errors e = plane_errors(SensorModel::kRealsense, scale, 0.7);
+    EXPECT_NEAR(e.sigma / (scale * realsense_sigma(0.7, 0.0)), 1.0, kSigmaTolerance) << scale;
+  }
+}
+
+TEST(SensorNoise, NoneAndScaleZeroAreExact) {
+  const Scan scan = step_scan(0.5, 0.9);
+  for (const std::string& name : sensor_names()) {
+    Rng rng = make_rng(1);
+    EXPECT_EQ(apply_sensor_noise(scan, kCamera, sensor_from_string(name), 0.0, rng).pixels, scan.depth.pixels) << name;
+  }
+  Rng rng = make_rng(1);
+  EXPECT_EQ(apply_sensor_noise(scan, kCamera, SensorModel::kNone, 3.0, rng).pixels, scan.depth.pixels);
+}
+
+TEST(SensorNoise, SeedRepeatsTheImage) {
+  const Scan scan = step_scan(0.5, 0.9);
+  for (const std::string& name : sensor_names()) {
+    if (name == "none") continue;
+    Rng a = make_rng(3), b = make_rng(3), c = make_rng(4);
+    const SensorModel sensor = sensor_from_string(name);
+    const DepthImage first = apply_sensor_noise(scan, kCamera, sensor, 1.0, a);
+    EXPECT_EQ(first.pixels, apply_sensor_noise(scan, kCamera, sensor, 1.0, b).pixels) << name;
+    EXPECT_NE(first.pixels, apply_sensor_noise(scan, kCamera, sensor, 1.0, c).pixels) << name;
+  }
+}
+
+TEST(SensorNoise, PublishedFormulasGiveTheirNumbers) {
+  // Worked out by hand from the formulas, in metres.
+  EXPECT_NEAR(kinect_axial_sigma(1.4, 0.0), 0.0012 + 0.0019, 1e-12);
+  EXPECT_NEAR(kinect_axial_sigma(1.0, 75 * kDegree), 0.0012 + 0.0019 * 0.36 + 0.0001 * 25.0, 1e-12);  // (75/15)^2
+  EXPECT_NEAR(kinect_lateral_sigma_px(45 * kDegree), 0.835, 1e-12);
+  EXPECT_NEAR(kinect_lateral_sigma_px(0.0), 0.8, 1e-12);
+  EXPECT_NEAR(kinect2_axial_sigma(1.0, 0.0), 0.0013, 1e-12);
+  EXPECT_NEAR(kinect2_axial_sigma(1.0, 45 * kDegree), 0.0014, 1e-12);
+  EXPECT_NEAR(azure_sigma(0.4, 0.0), 0.0005, 1e-12);
+  EXPECT_NEAR(azure_sigma(1.5, 0.0), 0.0015, 1e-12);
+}
+
+TEST(SensorNoise, DisparityStepsAreAnEighthOfAPixel) {
+  const double focal_baseline = 585.5 * 0.075;
+  for (const double depth : {0.5, 1.0, 3.0}) {
+    const double quantised = quantise_disparity(depth, 0.125);
+    const double steps = focal_baseline / quantised / 0.125;
+    EXPECT_NEAR(steps, std::round(steps), 1e-9);
+    EXPECT_LE(std::abs(focal_baseline / quantised - focal_baseline / depth), 0.0625 + 1e-12);
+    EXPECT_NEAR(quantise_disparity(quantised, 0.125), quantised, 1e-12);
+  }
+  // At 1 m a step is z^2 / (f B) / 8 = 2.85 mm: Khoshelham and Elberink's 2.85e-3 z^2.
+  EXPECT_NEAR(1.0 / focal_baseline / 8.0, 2.85e-3, 0.5e-5);
+  EXPECT_EQ(quantise_disparity(1e6, 0.125), 0.0);
+}
+
+TEST(SensorNoise, KinectIsNoisyAndQuantised) {
+  const double focal_baseline = 585.5 * 0.075, depth = 1.0;
+  const double step = depth * depth / focal_baseline / 8.0;
+  // The sigma is two thirds of the step, so that the rounding error is nearly uniform and independent: step^2 / 12.
+  const double expected = std::hypot(kinect_axial_sigma(depth, 0.0), step / std::sqrt(12.0));
+  const Scan scan = plane_scan(depth);
+  Rng rng = make_rng(8);
+  const DepthImage noisy = apply_sensor_noise(scan, kCamera, SensorModel::kKinect, 1.0, rng);
+  EXPECT_NEAR(errors(noisy, scan).sigma / expected, 1.0, kSigmaTolerance + 0.01);
+  for (const float z : noisy.pixels) {
+    const double steps = focal_baseline / z * 8.0;
+    EXPECT_NEAR(steps, std::round(steps), 1e-4);  // a float's rounding of 350 steps
+  }
+}
+
+TEST(SensorNoise, LateralShiftShowsOnASlope) {
+  const double tilt = 60 * kDegree;
+  const Scan scan = plane_scan(1.0, tilt);
+  Rng rng = make_rng(9);
+  const DepthImage noisy = apply_sensor_noise(scan, kCamera, SensorModel::kAzure, 1.0, rng);
+  double sum = 0.0;
+  int n = 0;
+  for (int v = 2; v < 198; ++v)
+    for (int u = 2; u < 198; ++u) {
+      const double z = scan.depth.at(v, u);
+      // The plane z (cos t + sin t x) = cos t, x = (u - cx) / f, has slope dz/du = -z^2 tan t / f.
+      const double slope = z * z * std::tan(tilt) / kCamera.fx;
+      const double sigma = std::hypot(azure_sigma(z, tilt), 0.25 * slope);
+      const double error = (noisy.at(v, u) - z) / sigma;
+      sum += error * error;
+      ++n;
+    }
+  // Chi-squared; its mean of 1 is known to sqrt(2 / n), and the slope's own change over 0.25 px is under a per cent.
+  EXPECT_NEAR(sum / n, 1.0, 5.0 * std::sqrt(2.0 / n) + 0.01);
+}
+
+TEST(SensorNoise, GrazingSurfacesGiveNoReading) {
+  Rng rng = make_rng(10);
+  // The camera sees 18 degrees across: of a plane tilted by 80 degrees incidences from 70.6 to 89.4.
+  const Scan scan = plane_scan(1.0, 80 * kDegree);
+  const DepthImage noisy = apply_sensor_noise(scan, kCamera, SensorModel::kRealsense, 1.0, rng);
+  for (int v = 0; v < 200; ++v)
+    for (int u = 0; u < 200; ++u) {
+      const double from_grazing = 90.0 - incidence_angle(scan, kCamera, v, u) / kDegree;
+      if (std::abs(from_grazing - 8.0) < 1e-3) continue;  // floats
+      EXPECT_EQ(noisy.at(v, u) == 0.0f, from_grazing < 8.0) << u << ", " << v;
+    }
+}
+
+TEST(SensorNoise, IncidenceDropsItsShare) {
+  SensorTerms terms;
+  terms.incidence_drop = 1.0;
+  const Scan scan = plane_scan(1.0, 60 * kDegree);
+  double expected = 0.0;
+  for (int v = 0; v < 200; ++v)
+    for (int u = 0; u < 200; ++u) expected += 1.0 - std::cos(incidence_angle(scan, kCamera, v, u));
+  Rng rng = make_rng(11);
+  const Errors e = errors(apply_sensor_noise(scan, kCamera, terms, 1.0, rng), scan);
+  EXPECT_NEAR(e.missing, expected, count_tolerance(expected / kPixels, kPixels));
+  EXPECT_NEAR(e.sigma, 0.0, 1e-6);  // what is left is exact
+}
+
+TEST(SensorNoise, EdgesAreWhereDepthSteps) {
+  const Scan scan = step_scan(0.6, 0.7);
+  EXPECT_FALSE(depth_across_edge(scan, kCamera, 50, 98));
+  EXPECT_FALSE(depth_across_edge(scan, kCamera, 50, 101));
+  EXPECT_NEAR(*depth_across_edge(scan, kCamera, 50, 99), 0.7, 1e-6);
+  EXPECT_NEAR(*depth_across_edge(scan, kCamera, 50, 100), 0.6, 1e-6);
+  EXPECT_FALSE(depth_across_edge(step_scan(0.695, 0.7), kCamera, 50, 99)) << "5 mm are below the threshold";
+  // A steep plane changes by centimetres a pixel and has no edge.
+  const Scan steep = plane_scan(2.0, 75 * kDegree);
+  EXPECT_GT(std::abs(steep.depth.at(50, 101) - steep.depth.at(50, 100)), kEdgeStep);
+  for (int u = 0; u < 200; ++u) EXPECT_FALSE(depth_across_edge(steep, kCamera, 50, u)) << u;
+  // Beside nothing there is no depth to fly to.
+  Scan hole = plane_scan(1.0);
+  hole.depth.at(50, 50) = 0.0f;
+  EXPECT_EQ(depth_across_edge(hole, kCamera, 50, 49), 0.0);
+}
+
+TEST(SensorNoise, EdgePixelsDropOrFlyInsideTheStep) {
+  const Scan scan = step_scan(0.6, 0.9);
+  SensorTerms terms;
+  terms.edge_drop = 0.2;
+  terms.edge_fly = 0.5;
+  int dropped = 0, flying = 0, pixels = 0;
+  double sum = 0.0;
+  Rng rng = make_rng(12);
+  for (int image = 0; image < 10; ++image) {
+    const DepthImage noisy = apply_sensor_noise(scan, kCamera, terms, 1.0, rng);
+    for (int v = 0; v < 200; ++v)
+      for (int u = 0; u < 200; ++u) {
+        const float z = noisy.at(v, u);
+        if (u < 99 || u > 100) {
+          ASSERT_EQ(z, scan.depth.at(v, u));
+          continue;
+        }
+        ++pixels;
+        dropped += z == 0.0f;
+        if (z == 0.0f || z == scan.depth.at(v, u)) continue;
+        ASSERT_TRUE(z >= 0.6f && z <= 0.9f) << z;
+        ++flying;
+        sum += z;
+      }
+  }
+  EXPECT_NEAR(dropped, 0.2 * pixels, count_tolerance(0.2, pixels));
+  EXPECT_NEAR(flying, 0.4 * pixels, count_tolerance(0.4, pixels));  // half of those that did not drop
+  // Uniform in the step: mean 0.75, standard deviation 0.3 / sqrt(12).
+  EXPECT_NEAR(sum / flying, 0.75, 5.0 * 0.3 / std::sqrt(12.0 * flying));
+}
+
+TEST(SensorNoise, NothingHitStaysNothing) {
+  Scan scan = plane_scan(1.0);
+  for (int u = 0; u < 200; ++u) scan.depth.at(10, u) = 0.0f;
+  for (const std::string& name : sensor_names()) {
+    Rng rng = make_rng(13);
+    const DepthImage noisy = apply_sensor_noise(scan, kCamera, sensor_from_string(name), 1.0, rng);
+    for (int u = 0; u < 200; ++u) EXPECT_EQ(noisy.at(10, u), 0.0f) << name;
+  }
+}
+
+TEST(SensorNoise, CallersMistakesThrow) {
+  const Scan scan = plane_scan(1.0);
+  Rng rng = make_rng(1);
+  EXPECT_THROW(sensor_from_string("lidar"), std::invalid_argument);
+  EXPECT_THROW(apply_sensor_noise(scan, kCamera, SensorModel::kKinect, -1.0, rng), std::invalid_argument);
+  EXPECT_THROW(apply_sensor_noise(Scan{}, kCamera, SensorModel::kKinect, 1.0, rng), std::invalid_argument);
+  for (const std::string& name : sensor_names()) EXPECT_EQ(to_string(sensor_from_string(name)), name);
+}
+
+}  // namespace
+}  // namespace dofusion
