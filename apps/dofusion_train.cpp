@@ -6,6 +6,9 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/program.h"
+#ifdef DOFUSION_TORCH
+#include "diffusion/torch_network.h"
+#endif
 #include "diffusion/trainer.h"
 #include "stability/files.h"
 
@@ -15,10 +18,11 @@ namespace {
 
 void print(const TrainReport& r) {
   const auto minutes = static_cast<int>(r.seconds_left / 60.0);
-  std::fprintf(stderr, "step %lld  %.2f M samples  loss %.4f (low %.4f, middle %.4f, high %.4f)  %.0f samples/s  %d:%02d left\n",
-               static_cast<long long>(r.step), static_cast<double>(r.samples) * 1e-6, r.loss, r.loss_by_noise[0],
-               r.loss_by_noise[1], r.loss_by_noise[2], r.samples_per_second, minutes,
-               static_cast<int>(r.seconds_left - 60.0 * minutes));
+  std::fprintf(
+      stderr, "step %lld  %.2f M samples  loss %.4f (low %.4f, middle %.4f, high %.4f)  %.0f samples/s  %d:%02d left\n",
+      static_cast<long long>(r.step), static_cast<double>(r.samples) * 1e-6, r.loss, r.loss_by_noise[0],
+      r.loss_by_noise[1], r.loss_by_noise[2], r.samples_per_second, minutes,
+      static_cast<int>(r.seconds_left - 60.0 * minutes));
 }
 
 std::string name_of(const std::string& path) { return std::filesystem::path(path).filename().string(); }
@@ -26,10 +30,11 @@ std::string name_of(const std::string& path) { return std::filesystem::path(path
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"Trains the placement model on datasets of stable scenes.\n\nExample:\n  dofusion-train --data one.h5 "
-               "two.h5 --minutes 60 --out model.safetensors\n\nFILE.checkpoint and FILE.csv appear beside the model; "
-               "after a kill the same command with --resume goes on.",
-               "dofusion-train"};
+  CLI::App app{
+      "Trains the placement model on datasets of stable scenes.\n\nExample:\n  dofusion-train --data one.h5 "
+      "two.h5 --minutes 60 --out model.safetensors\n\nFILE.checkpoint and FILE.csv appear beside the model; "
+      "after a kill the same command with --resume goes on.",
+      "dofusion-train"};
   std::string preset = "default", config_path, holdout, json_path;
   std::vector<std::string> data;
   TrainOptions options;
@@ -44,34 +49,52 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0.01, 1e6));
   app.add_option("--steps", options.steps, "planned steps")->check(CLI::Range(1, 1'000'000'000));
   app.add_option("--batch", options.batch, "scenes in a step")->check(CLI::Range(1, 65536))->capture_default_str();
-  app.add_option("--learning-rate", options.optimizer.learning_rate)->check(CLI::Range(1e-8, 1.0))->capture_default_str();
-  app.add_option("--warm-up", options.warm_up, "steps of rising learning rate")->check(CLI::Range(0, 1'000'000))->capture_default_str();
+  app.add_option("--learning-rate", options.optimizer.learning_rate)
+      ->check(CLI::Range(1e-8, 1.0))
+      ->capture_default_str();
+  app.add_option("--warm-up", options.warm_up, "steps of rising learning rate")
+      ->check(CLI::Range(0, 1'000'000))
+      ->capture_default_str();
   app.add_option("--seed", options.seed)->capture_default_str();
   app.add_option("--threads", options.threads)->check(CLI::Range(1, 1024))->capture_default_str();
-  app.add_option("--report-seconds", options.report_seconds, "between progress lines")->check(CLI::Range(0.0, 1e6))->capture_default_str();
+  app.add_option("--report-seconds", options.report_seconds, "between progress lines")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
   app.add_option("--json", json_path, "write the result here");
 
   return run_program(app, argc, argv, [&] {
     ModelConfig config = make_config(preset_from_string(preset));
     if (!config_path.empty()) config = config_from_json(read_file(config_path), config_path, config);
+#ifdef DOFUSION_TORCH
+    if (config.preset == Preset::kPaper) enable_torch_networks(options.threads);
+#endif
     std::vector<SceneDataset> datasets;
     nlohmann::json record{{"data", nlohmann::json::array()}, {"holdout_shape", holdout}};
     for (const std::string& path : data) {
       datasets.push_back(read_dataset(path));
-      record["data"].push_back({{"file", name_of(path)}, {"scenes", datasets.back().scenes.size()},
-                                {"settings", datasets.back().settings}});
+      record["data"].push_back(
+          {{"file", name_of(path)}, {"scenes", datasets.back().scenes.size()}, {"settings", datasets.back().settings}});
     }
     const TrainingSet set(std::move(datasets), config, holdout);
-    std::fprintf(stderr, "%zu scenes, preset %s, %d threads\n", set.scenes(), to_string(config.preset).c_str(), options.threads);
-    const auto report = [](const TrainReport& r) { print(r); return true; };
-    const TrainResult result = train(set, config, options, record.dump(), report, [](const TrainReport&) { return !interrupted(); });
+    std::fprintf(stderr, "%zu scenes, preset %s, %d threads\n", set.scenes(), to_string(config.preset).c_str(),
+                 options.threads);
+    const auto report = [](const TrainReport& r) {
+      print(r);
+      return true;
+    };
+    const TrainResult result =
+        train(set, config, options, record.dump(), report, [](const TrainReport&) { return !interrupted(); });
     if (!json_path.empty()) {
-      const nlohmann::json j{{"finished", result.finished}, {"steps", result.last.step}, {"samples", result.last.samples},
-                             {"seconds", result.last.seconds}, {"model", options.out}};
+      const nlohmann::json j{{"finished", result.finished},
+                             {"steps", result.last.step},
+                             {"samples", result.last.samples},
+                             {"seconds", result.last.seconds},
+                             {"model", options.out}};
       write_file(json_path, j.dump(2) + "\n");
     }
     if (!result.finished) throw Interrupted("interrupted; go on with --resume");
-    std::printf("%s: %lld steps, %.2f M samples in %.1f minutes\n", options.out.c_str(), static_cast<long long>(result.last.step),
-                static_cast<double>(result.last.samples) * 1e-6, result.last.seconds / 60.0);
+    std::printf("%s: %lld steps, %.2f M samples in %.1f minutes\n", options.out.c_str(),
+                static_cast<long long>(result.last.step), static_cast<double>(result.last.samples) * 1e-6,
+                result.last.seconds / 60.0);
   });
 }

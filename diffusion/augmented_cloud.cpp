@@ -157,9 +157,9 @@ void make_augmented_cloud(const std::vector<CloudShapePtr>& shapes, const std::v
     for (int j = 0; j < count; ++j) {
       if (j == i) continue;
       const Eigen::Matrix3f R_j_i = (T_world_object[j].linear().transpose() * T_world_object[i].linear()).cast<float>();
-      const Eigen::Vector3f t_j_i = (T_world_object[j].linear().transpose() *
-                                     (T_world_object[i].translation() - T_world_object[j].translation()))
-                                        .cast<float>();
+      const Eigen::Vector3f t_j_i =
+          (T_world_object[j].linear().transpose() * (T_world_object[i].translation() - T_world_object[j].translation()))
+              .cast<float>();
       for (int d = 0; d < 3; ++d)
         for (int p = 0; p < n; ++p)
           other[d][p] = R_j_i(d, 0) * local[0][p] + R_j_i(d, 1) * local[1][p] + R_j_i(d, 2) * local[2][p] + t_j_i[d];

@@ -34,7 +34,7 @@ class CloudShape {
 
  private:
   struct Triangle {
-    Eigen::Vector3f a, ab, ac, normal;  // normal: unit
+    Eigen::Vector3f a, ab, ac, normal;                // normal: unit
     Eigen::Vector3f edge_start[3], edge[3], side[3];  // side: in the plane, pointing out of the triangle
     float edge_inverse_square[3];
   };
@@ -50,9 +50,9 @@ class CloudShape {
 using CloudShapePtr = std::shared_ptr<const CloudShape>;
 
 struct CloudOptions {
-  int points = 192;              // shared out among the objects, the remainder to the query
-  double length = 1.0;           // metres in the normalised length
-  double distance_limit = 1.0;   // normalised: the SDF channel is clamped to +- this, and is this without others
+  int points = 192;             // shared out among the objects, the remainder to the query
+  double length = 1.0;          // metres in the normalised length
+  double distance_limit = 1.0;  // normalised: the SDF channel is clamped to +- this, and is this without others
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();  // world position that becomes 0, metres
 };
 

@@ -14,9 +14,11 @@ constexpr const char* kFormat = "dofusion-checkpoint";
 
 void write_checkpoint(const Checkpoint& c, const std::vector<TensorInfo>& tensors, const std::string& path) {
   TensorFile file;
-  file.metadata = {{"format", kFormat},
-                   {"config", to_json(c.config)},
-                   {"run", nlohmann::json{{"step", c.state.step}, {"seed", c.seed}, {"batch", c.batch}, {"seconds", c.seconds}}.dump()}};
+  file.metadata = {
+      {"format", kFormat},
+      {"config", to_json(c.config)},
+      {"run",
+       nlohmann::json{{"step", c.state.step}, {"seed", c.seed}, {"batch", c.batch}, {"seconds", c.seconds}}.dump()}};
   const std::pair<const char*, const std::vector<float>*> parts[] = {{"parameters/", &c.state.parameters},
                                                                      {"average/", &c.state.average},
                                                                      {"first_moment/", &c.state.first},
@@ -45,7 +47,8 @@ Checkpoint read_checkpoint(const std::vector<TensorInfo>& tensors, const std::st
   } catch (const nlohmann::json::exception&) {
     throw InputError(path + ": damaged: its 'run' record is not readable");
   }
-  if (c.state.step < 0 || c.batch < 1 || !(c.seconds >= 0)) throw InputError(path + ": damaged: its 'run' record is nonsense");
+  if (c.state.step < 0 || c.batch < 1 || !(c.seconds >= 0))
+    throw InputError(path + ": damaged: its 'run' record is nonsense");
   c.state.parameters = join_parameters(tensors, file, path, "parameters/");
   c.state.average = join_parameters(tensors, file, path, "average/");
   c.state.first = join_parameters(tensors, file, path, "first_moment/");

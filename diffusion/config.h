@@ -16,18 +16,18 @@ Preset preset_from_string(const std::string& name);  // throws std::invalid_argu
 // Lengths are in normalised units (augmented_cloud.h), angles in radians.
 struct ModelConfig {
   Preset preset = Preset::kDefault;
-  int points = 192;                           // of one scene's cloud in training, shared out among its objects
-  int neighbours = 16;                        // k of the graph
+  int points = 192;                              // of one scene's cloud in training, shared out among its objects
+  int neighbours = 16;                           // k of the graph
   std::vector<int> widths = {64, 64, 128, 256};  // channels of the edge convolutions; multiples of 32
-  int embedding = 512;                        // channels that are pooled over the points
-  int hidden = 512;                           // of the MLP
-  int noise_frequencies = 8;                  // sine and cosine pairs of the logarithm of the noise scale
+  int embedding = 512;                           // channels that are pooled over the points
+  int hidden = 512;                              // of the MLP
+  int noise_frequencies = 8;                     // sine and cosine pairs of the logarithm of the noise scale
   double sigma_min = 0.005;
   double sigma_max = 3.0;
-  int schedule_steps = 100;                   // T of the discrete schedule (paper)
-  double distance_limit = 1.0;                // the SDF channel is cut off here, and is this where there is no other
+  int schedule_steps = 100;     // T of the discrete schedule (paper)
+  double distance_limit = 1.0;  // the SDF channel is cut off here, and is this where there is no other
   std::vector<double> contact_scales = {0.1, 0.01};  // heights and distances also enter as v / (|v| + scale)
-  bool use_sdf = true;                        // ablations of table V
+  bool use_sdf = true;                               // ablations of table V
   bool use_pose = true;
 
   int point_features() const;  // channels per point that the network sees

@@ -12,7 +12,8 @@ namespace {
 std::vector<float> transposed(const float* x, int rows, int columns) {
   std::vector<float> out(static_cast<std::size_t>(rows) * columns);
   for (int i = 0; i < rows; ++i)
-    for (int j = 0; j < columns; ++j) out[static_cast<std::size_t>(j) * rows + i] = x[static_cast<std::size_t>(i) * columns + j];
+    for (int j = 0; j < columns; ++j)
+      out[static_cast<std::size_t>(j) * rows + i] = x[static_cast<std::size_t>(i) * columns + j];
   return out;
 }
 
@@ -101,8 +102,9 @@ void FastEncoder::forward(const float* cloud, int points, float sigma, Saved& sa
   scratch.maximum.resize(embedding_);
   saved.embed_row.resize(embedding_);
   saved.embed_normalised.resize(embedding_);
-  kernels_.matmul_bf16(points, embedding_, channels_ / 2, reinterpret_cast<const std::uint32_t*>(saved.concatenated.data()),
-                       channels_ / 2, 1, embed_packed_.data(), scratch.products.data(), embedding_, false);
+  kernels_.matmul_bf16(points, embedding_, channels_ / 2,
+                       reinterpret_cast<const std::uint32_t*>(saved.concatenated.data()), channels_ / 2, 1,
+                       embed_packed_.data(), scratch.products.data(), embedding_, false);
   kernels_.column_max(points, embedding_, scratch.products.data(), scratch.maximum.data(), saved.embed_row.data());
   double mean = 0.0, variance = 0.0;
   for (const float v : scratch.maximum) mean += v;

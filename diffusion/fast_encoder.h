@@ -15,7 +15,7 @@ namespace dofusion {
 class FastEncoder {
  public:
   struct LayerOffsets {
-    std::size_t weight = 0;  // (C_in, 2 C): columns of W_self, then of W_other
+    std::size_t weight = 0;           // (C_in, 2 C): columns of W_self, then of W_other
     std::size_t gamma = 0, beta = 0;  // (C)
   };
 
@@ -41,13 +41,13 @@ class FastEncoder {
 
   // Buffers that only live during a call; one per thread.
   struct Scratch {
-    std::vector<float> products;            // (P, 2 C) or (P, E)
-    std::vector<float> coordinates;         // (4, P padded)
-    std::vector<std::int32_t> keys;         // (P padded)
-    std::vector<float> maximum;             // (E)
-    std::vector<float> d_concatenated;      // (P, S)
-    std::vector<float> d_products;          // (P, 2 C)
-    std::vector<std::uint16_t> d_rounded;   // (P, 2 C) bf16
+    std::vector<float> products;           // (P, 2 C) or (P, E)
+    std::vector<float> coordinates;        // (4, P padded)
+    std::vector<std::int32_t> keys;        // (P padded)
+    std::vector<float> maximum;            // (E)
+    std::vector<float> d_concatenated;     // (P, S)
+    std::vector<float> d_products;         // (P, 2 C)
+    std::vector<std::uint16_t> d_rounded;  // (P, 2 C) bf16
     std::vector<std::uint32_t> d_packed, x_pairs;
   };
 
@@ -69,9 +69,9 @@ class FastEncoder {
   const kernels::Kernels& kernels_;
   std::vector<Layer> layers_;
   int features_, channels_, embedding_;
-  std::size_t embed_weight_;                  // (E, S): one row per output, as its gradient touches single rows
-  std::size_t embed_gamma_, embed_beta_;      // (E)
-  std::vector<std::uint32_t> embed_packed_;     // (S, E)
+  std::size_t embed_weight_;                 // (E, S): one row per output, as its gradient touches single rows
+  std::size_t embed_gamma_, embed_beta_;     // (E)
+  std::vector<std::uint32_t> embed_packed_;  // (S, E)
   const float* parameters_ = nullptr;
 };
 

@@ -15,8 +15,8 @@ std::size_t area(int rows, int columns) { return static_cast<std::size_t>(rows) 
 
 struct Linear {
   int in = 0, out = 0;
-  std::size_t weight = 0;        // (in, out)
-  std::size_t bias = 0;          // (out)
+  std::size_t weight = 0;         // (in, out)
+  std::size_t bias = 0;           // (out)
   std::vector<float> transposed;  // (out, in of which a gradient is wanted, rounded up to 16)
   int wanted = 0;
 };

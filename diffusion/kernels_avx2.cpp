@@ -8,7 +8,7 @@ namespace {
 }  // namespace
 
 extern const Kernels k_avx2;
-const Kernels k_avx2 = {"avx2",        matmul_bf16,  matmul_f32,    pack_bf16,  round_bf16,      pair_rows, nearest,
-                      edge_forward, edge_backward, column_max, column_sum_bf16, axpy,      axpy_bf16};
+const Kernels k_avx2 = {"avx2",       matmul_bf16,   matmul_f32, pack_bf16,       round_bf16, pair_rows, nearest,
+                        edge_forward, edge_backward, column_max, column_sum_bf16, axpy,       axpy_bf16};
 
 }  // namespace dofusion::kernels

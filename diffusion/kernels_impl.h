@@ -9,6 +9,7 @@ constexpr int L = 8;
 #else
 constexpr int L = 4;
 #endif
+typedef std::uint32_t Pair __attribute__((may_alias));  // two bf16 that were written one by one
 typedef float V __attribute__((vector_size(4 * L), aligned(4)));
 typedef std::uint32_t U __attribute__((vector_size(4 * L), aligned(4)));
 typedef std::int32_t I __attribute__((vector_size(4 * L), aligned(4)));
@@ -47,8 +48,8 @@ constexpr int kRows = 2;
 #endif
 
 template <int R>
-static inline void tile_bf16(int k2, const std::uint32_t* a, std::ptrdiff_t a_row, std::ptrdiff_t a_k,
-                             const std::uint32_t* b, float* c, std::ptrdiff_t c_row, bool accumulate) {
+static inline void tile_bf16(int k2, const Pair* a, std::ptrdiff_t a_row, std::ptrdiff_t a_k, const std::uint32_t* b,
+                             float* c, std::ptrdiff_t c_row, bool accumulate) {
   // Unrolled throughout, so that the sums stay in registers.
   V sum[R][kPanel];
 #pragma GCC unroll 12
@@ -63,6 +64,19 @@ static inline void tile_bf16(int k2, const std::uint32_t* a, std::ptrdiff_t a_ro
       const __m512bh x = (__m512bh)_mm512_set1_epi32(static_cast<int>(a[r * a_row]));
       sum[r][0] = (V)_mm512_dpbf16_ps((__m512)sum[r][0], x, b0);
       sum[r][1] = (V)_mm512_dpbf16_ps((__m512)sum[r][1], x, b1);
+    }
+#elif defined(__AVX512F__)
+    const U b0 = load(b), b1 = load(b + L);
+    const V low0 = from_bits(b0 << 16), high0 = from_bits(b0 & 0xffff0000u);
+    const V low1 = from_bits(b1 << 16), high1 = from_bits(b1 & 0xffff0000u);
+#pragma GCC unroll 12
+    for (int r = 0; r < R; ++r) {
+      const std::uint32_t x = a[r * a_row];
+      const V low = splat(from_bits(x << 16)), high = splat(from_bits(x & 0xffff0000u));
+      sum[r][0] += low * low0;
+      sum[r][1] += low * low1;
+      sum[r][0] += high * high0;
+      sum[r][1] += high * high1;
     }
 #else
 #pragma GCC unroll 8
@@ -85,8 +99,8 @@ static inline void tile_bf16(int k2, const std::uint32_t* a, std::ptrdiff_t a_ro
 }
 
 template <int R>
-static void rest_bf16(int m, int k2, const std::uint32_t* a, std::ptrdiff_t a_row, std::ptrdiff_t a_k,
-                      const std::uint32_t* b, float* c, std::ptrdiff_t c_row, bool accumulate) {
+static void rest_bf16(int m, int k2, const Pair* a, std::ptrdiff_t a_row, std::ptrdiff_t a_k, const std::uint32_t* b,
+                      float* c, std::ptrdiff_t c_row, bool accumulate) {
   if constexpr (R > 0) {
     if (m == R)
       tile_bf16<R>(k2, a, a_row, a_k, b, c, c_row, accumulate);
@@ -97,11 +111,12 @@ static void rest_bf16(int m, int k2, const std::uint32_t* a, std::ptrdiff_t a_ro
 
 static void matmul_bf16(int m, int n, int k2, const std::uint32_t* a, std::ptrdiff_t a_row, std::ptrdiff_t a_k,
                         const std::uint32_t* b, float* c, std::ptrdiff_t c_row, bool accumulate) {
+  const Pair* pairs = a;
   for (int j = 0; j < n; j += 32, b += std::ptrdiff_t{32} * k2) {
     int i = 0;
     for (; i + kRows <= m; i += kRows)
-      tile_bf16<kRows>(k2, a + i * a_row, a_row, a_k, b, c + i * c_row + j, c_row, accumulate);
-    rest_bf16<kRows - 1>(m - i, k2, a + i * a_row, a_row, a_k, b, c + i * c_row + j, c_row, accumulate);
+      tile_bf16<kRows>(k2, pairs + i * a_row, a_row, a_k, b, c + i * c_row + j, c_row, accumulate);
+    rest_bf16<kRows - 1>(m - i, k2, pairs + i * a_row, a_row, a_k, b, c + i * c_row + j, c_row, accumulate);
   }
 }
 
@@ -158,8 +173,7 @@ static void round_bf16(int rows, int n, const float* x, std::ptrdiff_t x_row, st
                        std::ptrdiff_t out_row) {
   for (int i = 0; i < rows; ++i, x += x_row, out += out_row) {
     int j = 0;
-    for (; j + L <= n; j += L)
-      *reinterpret_cast<H*>(out + j) = __builtin_convertvector(rounded(load(x + j)) >> 16, H);
+    for (; j + L <= n; j += L) *reinterpret_cast<H*>(out + j) = __builtin_convertvector(rounded(load(x + j)) >> 16, H);
     for (; j < n; ++j) out[j] = static_cast<std::uint16_t>(rounded(splat(x[j]))[0] >> 16);
   }
 }
@@ -202,8 +216,8 @@ static void nearest(int points, int k, const float* const coordinates[4], std::u
         for (; closer; closer &= closer - 1) {
           const std::int32_t key = keys[j + __builtin_ctz(closer)];
           if (key >= worst) continue;
-          nearest16 = _mm512_mask_set1_epi32(
-              nearest16, _mm512_cmpeq_epi32_mask(nearest16, _mm512_set1_epi32(worst)), key);
+          nearest16 =
+              _mm512_mask_set1_epi32(nearest16, _mm512_cmpeq_epi32_mask(nearest16, _mm512_set1_epi32(worst)), key);
           worst = _mm512_reduce_max_epi32(nearest16);
         }
       }
@@ -228,13 +242,11 @@ static void nearest(int points, int k, const float* const coordinates[4], std::u
   }
 }
 
-static inline float inverse_root(float x) {
-  return 1.0f / __builtin_sqrtf(x);
-}
+static inline float inverse_root(float x) { return 1.0f / __builtin_sqrtf(x); }
 
-static void edge_forward(int points, int c, int k, const float* ab, const std::uint16_t* neighbours,
-                         const float* gamma, const float* beta, std::uint16_t* out, std::ptrdiff_t out_row,
-                         float* normalised, float* inverse_deviation, std::uint8_t* slot) {
+static void edge_forward(int points, int c, int k, const float* ab, const std::uint16_t* neighbours, const float* gamma,
+                         const float* beta, std::uint16_t* out, std::ptrdiff_t out_row, float* normalised,
+                         float* inverse_deviation, std::uint8_t* slot) {
   for (int i = 0; i < points; ++i, neighbours += k, out += out_row, normalised += c, slot += c) {
     const float* a = ab + std::ptrdiff_t{2} * c * i;
     V total{}, squares{};

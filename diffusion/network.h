@@ -22,11 +22,11 @@ struct TensorInfo {
 
 // B scenes of P points each. All lengths normalised, angles in radians.
 struct NetworkInput {
-  int batch = 0;                 // B
-  int points = 0;                // P, even
-  std::vector<float> cloud;      // (B, P, 5): x, y, z, SDF to the merged others, 1 for points of the query
-  std::vector<float> pose;       // (B, pose_features)
-  std::vector<float> sigma;      // (B): noise scale
+  int batch = 0;             // B
+  int points = 0;            // P, even
+  std::vector<float> cloud;  // (B, P, 5): x, y, z, SDF to the merged others, 1 for points of the query
+  std::vector<float> pose;   // (B, pose_features)
+  std::vector<float> sigma;  // (B): noise scale
 };
 
 // Not safe for concurrent use unless said; training uses gradient() with several threads inside.

@@ -9,11 +9,11 @@
 namespace dofusion {
 
 struct OptimizerOptions {
-  double learning_rate = 1e-3;   // at its peak
-  double weight_decay = 0.01;    // of matrices only
+  double learning_rate = 1e-3;  // at its peak
+  double weight_decay = 0.01;   // of matrices only
   double beta1 = 0.9, beta2 = 0.99;
-  double clip_norm = 1.0;        // the gradient's length is cut to this
-  double average = 0.999;        // decay of the averaged weights
+  double clip_norm = 1.0;  // the gradient's length is cut to this
+  double average = 0.999;  // decay of the averaged weights
 };
 
 struct OptimizerState {

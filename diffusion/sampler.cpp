@@ -81,7 +81,8 @@ Walk begin(const PlacementProblem& problem, double sigma, ShapeCache& cache) {
 Eigen::Vector2d default_centre(const Scene& context) {
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   for (const Pose& pose : context.T_world_object) sum += pose.translation().head<2>();
-  return context.T_world_object.empty() ? sum : Eigen::Vector2d(sum / static_cast<double>(context.T_world_object.size()));
+  return context.T_world_object.empty() ? sum
+                                        : Eigen::Vector2d(sum / static_cast<double>(context.T_world_object.size()));
 }
 
 struct PlacementModel::Impl {

@@ -14,21 +14,21 @@ namespace dofusion {
 
 // Where a query is to be placed. Candidates for one scene are problems that differ in their seed.
 struct PlacementProblem {
-  Scene context;                 // may be empty: the query alone on the table
+  Scene context;  // may be empty: the query alone on the table
   ObjectPtr query;
-  std::uint64_t seed = 0;        // all randomness of this problem
+  std::uint64_t seed = 0;                            // all randomness of this problem
   Eigen::Vector2d centre = Eigen::Vector2d::Zero();  // where in x, y the noise is centred at the start, metres
-  std::optional<Pose> start;     // begin at this pose plus noise of SamplerOptions::start_sigma instead of from noise
+  std::optional<Pose> start;  // begin at this pose plus noise of SamplerOptions::start_sigma instead of from noise
 };
 
 // Mean position of the context's objects; zero without any.
 Eigen::Vector2d default_centre(const Scene& context);
 
 struct SamplerOptions {
-  int steps = 50;                // network calls
-  int points = 0;                // of each cloud; 0: as in training. Even
+  int steps = 50;  // network calls
+  int points = 0;  // of each cloud; 0: as in training. Even
   int threads = 1;
-  double start_sigma = 0.0;      // noise scale at the start, normalised; 0: the model's largest
+  double start_sigma = 0.0;  // noise scale at the start, normalised; 0: the model's largest
   // How much of each step's noise is fresh: 1 is equation (2). Less was far worse in a probe.
   double freshness = 1.0;
 };

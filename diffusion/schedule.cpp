@@ -27,7 +27,8 @@ double draw_sigma(const ModelConfig& config, Rng& rng) {
 }
 
 std::vector<double> sampling_schedule(const ModelConfig& config, int steps, double start) {
-  if (steps < 1) throw std::invalid_argument("the reverse process needs at least one step, not " + std::to_string(steps));
+  if (steps < 1)
+    throw std::invalid_argument("the reverse process needs at least one step, not " + std::to_string(steps));
   if (!(start > 0)) throw std::invalid_argument("the starting noise scale must be positive");
   std::vector<double> sigmas(steps);
   for (int i = 0; i < steps; ++i) sigmas[i] = geometric(start, std::min(start, config.sigma_min), i, steps);

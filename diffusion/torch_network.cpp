@@ -1,11 +1,11 @@
 #include "diffusion/torch_network.h"
 
-#include <torch/torch.h>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <stdexcept>
+
+#include <torch/torch.h>
 
 #include "diffusion/fast_network.h"
 #include "stability/random.h"
@@ -23,7 +23,9 @@ constexpr double kSlope = 0.2;
 // gives one flat gradient.
 class TorchNetwork : public Network {
  public:
-  TorchNetwork(const ModelConfig& config, torch::Dtype type) : config_(config), type_(type) { check(config, "network"); }
+  TorchNetwork(const ModelConfig& config, torch::Dtype type) : config_(config), type_(type) {
+    check(config, "network");
+  }
 
   const std::vector<TensorInfo>& tensors() const override { return tensors_; }
   bool scenes_are_independent() const override { return false; }
@@ -43,9 +45,9 @@ class TorchNetwork : public Network {
     if (target.size() != static_cast<std::size_t>(input.batch) * 6 || gradient.size() != parameter_count())
       throw std::invalid_argument("target or gradient has the wrong size");
     const Tensor parameters = flat_.detach().clone().requires_grad_(true);
-    const Tensor output = run(input, parameters, true);                               // (B, 6)
+    const Tensor output = run(input, parameters, true);  // (B, 6)
     const Tensor wanted = torch::tensor(target).to(type_).view({input.batch, 6});
-    const Tensor losses = (output - wanted).square().mean(1);                         // (B)
+    const Tensor losses = (output - wanted).square().mean(1);  // (B)
     losses.sum().backward();
     const Tensor result = parameters.grad().to(torch::kFloat32).contiguous();
     const float* values = result.data_ptr<float>();
@@ -110,9 +112,7 @@ Tensor gather(const Tensor& x, const Tensor& neighbours) {
   return x.reshape({B * P, D}).index_select(0, (neighbours + first).view(-1)).view({B, P, k, D});
 }
 
-Tensor position_and_flag(const Tensor& cloud) {
-  return torch::cat({cloud.narrow(2, 0, 3), cloud.narrow(2, 4, 1)}, 2);
-}
+Tensor position_and_flag(const Tensor& cloud) { return torch::cat({cloud.narrow(2, 0, 3), cloud.narrow(2, 4, 1)}, 2); }
 
 class PaperNetwork : public TorchNetwork {
  public:
@@ -165,9 +165,9 @@ class PaperNetwork : public TorchNetwork {
     std::vector<Tensor> outputs;
     for (std::size_t l = 0; l < config_.widths.size(); ++l) {
       const Tensor neighbours = nearest(l == 0 ? graph_space : x.detach(), config_.neighbours);
-      const Tensor others = gather(x, neighbours);                                    // (B, P, k, C_in)
+      const Tensor others = gather(x, neighbours);  // (B, P, k, C_in)
       const Tensor centre = x.unsqueeze(2).expand_as(others);
-      const Tensor edges = torch::cat({centre, others - centre}, 3);                  // (B, P, k, 2 C_in)
+      const Tensor edges = torch::cat({centre, others - centre}, 3);                            // (B, P, k, 2 C_in)
       x = normed("encoder.edge" + std::to_string(l + 1), edges, parameters, training).amax(2);  // (B, P, C)
       outputs.push_back(x);
     }
@@ -232,18 +232,19 @@ class ReferenceNetwork : public TorchNetwork {
     std::vector<Tensor> outputs;
     for (std::size_t l = 0; l < config_.widths.size(); ++l) {
       const std::string name = "encoder.edge" + std::to_string(l + 1);
-      const Tensor weight = get(parameters, name + ".weight");                        // (C_in, 2 C)
+      const Tensor weight = get(parameters, name + ".weight");  // (C_in, 2 C)
       const std::int64_t C = config_.widths[l];
-      const Tensor self = x.matmul(weight.narrow(1, 0, C));                           // (B, P, C)
+      const Tensor self = x.matmul(weight.narrow(1, 0, C));  // (B, P, C)
       const Tensor others = x.matmul(weight.narrow(1, C, C));
       const Tensor y = self + gather(others, neighbours).amax(2);
       x = torch::leaky_relu(norm(name, y, parameters), kSlope);
       outputs.push_back(x);
     }
-    const Tensor points = torch::cat(outputs, 2);                                     // (B, P, S)
+    const Tensor points = torch::cat(outputs, 2);                                            // (B, P, S)
     const Tensor best = points.matmul(get(parameters, "encoder.embed.weight").t()).amax(1);  // (B, E)
     const Tensor pooled = torch::leaky_relu(norm("encoder.embed", best, parameters), kSlope);
-    Tensor y = torch::cat({pooled, points.mean(1), torch::tensor(noise).to(type_).view({B, noise_count}), pose_of(input)}, 1);
+    Tensor y =
+        torch::cat({pooled, points.mean(1), torch::tensor(noise).to(type_).view({B, noise_count}), pose_of(input)}, 1);
     for (int l = 1; l <= 3; ++l) {
       const std::string name = "mlp." + std::to_string(l);
       y = y.matmul(get(parameters, name + ".weight")) + get(parameters, name + ".bias");
@@ -254,7 +255,8 @@ class ReferenceNetwork : public TorchNetwork {
 
  private:
   Tensor norm(const std::string& name, const Tensor& x, const Tensor& parameters) const {
-    return torch::layer_norm(x, {x.size(-1)}, get(parameters, name + ".norm.weight"), get(parameters, name + ".norm.bias"), 1e-5);
+    return torch::layer_norm(x, {x.size(-1)}, get(parameters, name + ".norm.weight"),
+                             get(parameters, name + ".norm.bias"), 1e-5);
   }
 
   FastNetwork fast_;
@@ -267,7 +269,9 @@ void enable_torch_networks(int threads) {
   register_paper_network(&make_paper_network);
 }
 
-std::unique_ptr<Network> make_paper_network(const ModelConfig& config) { return std::make_unique<PaperNetwork>(config); }
+std::unique_ptr<Network> make_paper_network(const ModelConfig& config) {
+  return std::make_unique<PaperNetwork>(config);
+}
 
 std::unique_ptr<Network> make_reference_network(const ModelConfig& config, bool float64) {
   return std::make_unique<ReferenceNetwork>(config, float64 ? torch::kFloat64 : torch::kFloat32);

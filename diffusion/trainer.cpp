@@ -42,7 +42,10 @@ struct LossMeter {
 class GradientWorkers {
  public:
   GradientWorkers(const TrainingSet& data, Network& network, const TrainOptions& options)
-      : data_(data), network_(network), options_(options), threads_(network.scenes_are_independent() ? options.threads : 1) {
+      : data_(data),
+        network_(network),
+        options_(options),
+        threads_(network.scenes_are_independent() ? options.threads : 1) {
     gradients_.resize(threads_, std::vector<float>(network.parameter_count()));
   }
 
@@ -106,7 +109,9 @@ void append_log(const std::string& path, const TrainReport& r) {
   std::FILE* file = std::fopen(path.c_str(), "a");
   if (!file) throw InputError(path + ": cannot be written");
   if (fresh)
-    std::fprintf(file, "step,samples,seconds,samples_per_second,learning_rate,gradient_norm,loss,loss_low,loss_middle,loss_high\n");
+    std::fprintf(
+        file,
+        "step,samples,seconds,samples_per_second,learning_rate,gradient_norm,loss,loss_low,loss_middle,loss_high\n");
   std::fprintf(file, "%lld,%lld,%.1f,%.1f,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g\n", static_cast<long long>(r.step),
                static_cast<long long>(r.samples), r.seconds, r.samples_per_second, r.learning_rate, r.gradient_norm,
                r.loss, r.loss_by_noise[0], r.loss_by_noise[1], r.loss_by_noise[2]);

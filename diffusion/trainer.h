@@ -13,29 +13,29 @@
 namespace dofusion {
 
 struct TrainOptions {
-  std::string out;                     // the model; FILE.checkpoint and FILE.csv appear beside it
-  bool resume = false;                 // go on from FILE.checkpoint
-  double minutes = 0.0;                // planned training time, checkpoints' included; 0: no limit
-  std::int64_t steps = 0;              // planned steps; 0: no limit. The schedule ends at whichever comes first
+  std::string out;         // the model; FILE.checkpoint and FILE.csv appear beside it
+  bool resume = false;     // go on from FILE.checkpoint
+  double minutes = 0.0;    // planned training time, checkpoints' included; 0: no limit
+  std::int64_t steps = 0;  // planned steps; 0: no limit. The schedule ends at whichever comes first
   std::uint64_t seed = 0;
   int threads = 1;
-  int batch = 128;                     // scenes in a step
-  int micro_batch = 8;                 // scenes that one thread works on at a time
-  std::int64_t warm_up = 500;          // steps of rising learning rate
+  int batch = 128;             // scenes in a step
+  int micro_batch = 8;         // scenes that one thread works on at a time
+  std::int64_t warm_up = 500;  // steps of rising learning rate
   OptimizerOptions optimizer;
-  double report_seconds = 10.0;        // between calls of `report`
-  double checkpoint_seconds = 30.0;    // between checkpoints
+  double report_seconds = 10.0;      // between calls of `report`
+  double checkpoint_seconds = 30.0;  // between checkpoints
 };
 
 struct TrainReport {
   std::int64_t step = 0, samples = 0;
-  double progress = 0.0;                // of the planned run, 0 to 1
-  double seconds = 0.0;                 // of training, over all resumed runs
+  double progress = 0.0;  // of the planned run, 0 to 1
+  double seconds = 0.0;   // of training, over all resumed runs
   double seconds_left = 0.0;
-  double samples_per_second = 0.0;      // since the last report
+  double samples_per_second = 0.0;  // since the last report
   double learning_rate = 0.0;
-  double gradient_norm = 0.0;           // mean since the last report, before clipping
-  double loss = 0.0;                    // mean since the last report
+  double gradient_norm = 0.0;             // mean since the last report, before clipping
+  double loss = 0.0;                      // mean since the last report
   std::array<double, 3> loss_by_noise{};  // at low, middle and high noise: thirds of the log scale; NaN if none
 };
 
@@ -43,9 +43,9 @@ struct TrainReport {
 using TrainCallback = std::function<bool(const TrainReport&)>;
 
 struct TrainResult {
-  bool finished = false;       // false: stopped by the callback
+  bool finished = false;  // false: stopped by the callback
   TrainReport last;
-  std::vector<float> losses;   // mean loss of every step of this run
+  std::vector<float> losses;  // mean loss of every step of this run
 };
 
 // Trains and writes options.out (averaged weights) at every checkpoint and at the end. Throws InputError if a file

@@ -79,9 +79,8 @@ void TrainingSet::append(std::uint64_t seed, std::uint64_t example, NetworkInput
   const int count = static_cast<int>(objects.size());
   const int query = uniform_int(rng, 0, count - 1);
   const Eigen::AngleAxisd yaw(uniform(rng, 0.0, 2.0 * M_PI), Eigen::Vector3d::UnitZ());
-  const bool mirror = uniform(rng) < 0.5 && std::all_of(objects.begin(), objects.end(), [&](const SceneObject& o) {
-    return shapes_[o.shape].mirrors;
-  });
+  const bool mirror = uniform(rng) < 0.5 && std::all_of(objects.begin(), objects.end(),
+                                                        [&](const SceneObject& o) { return shapes_[o.shape].mirrors; });
 
   std::vector<CloudShapePtr> shapes;
   std::vector<Pose> poses;

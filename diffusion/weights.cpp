@@ -51,7 +51,8 @@ json parse_header(const std::string& text, const std::string& source) {
   } catch (const json::exception&) {
     throw InputError(source + ": not a safetensors file: its header is not valid JSON");
   }
-  if (!header.is_object() || deep) throw InputError(source + ": not a safetensors file: its header is not a plain object");
+  if (!header.is_object() || deep)
+    throw InputError(source + ": not a safetensors file: its header is not a plain object");
   if (!duplicate.empty()) throw InputError(source + ": damaged: '" + duplicate + "' stands twice in the header");
   return header;
 }
@@ -59,7 +60,8 @@ json parse_header(const std::string& text, const std::string& source) {
 }  // namespace
 
 TensorFile parse_safetensors(const std::string& bytes, const std::string& source) {
-  if (bytes.size() < 8) throw InputError(source + ": not a safetensors file: only " + std::to_string(bytes.size()) + " bytes");
+  if (bytes.size() < 8)
+    throw InputError(source + ": not a safetensors file: only " + std::to_string(bytes.size()) + " bytes");
   std::uint64_t header_size = 0;
   for (int i = 7; i >= 0; --i) header_size = header_size << 8 | static_cast<unsigned char>(bytes[i]);
   if (header_size > kHeaderLimit || header_size > bytes.size() - 8)
@@ -112,7 +114,8 @@ TensorFile parse_safetensors(const std::string& bytes, const std::string& source
   std::sort(ranges.begin(), ranges.end());
   std::uint64_t at = 0;
   for (const auto& [begin, end] : ranges) {
-    if (begin != at) throw InputError(source + ": damaged: tensors overlap or leave a gap at byte " + std::to_string(at));
+    if (begin != at)
+      throw InputError(source + ": damaged: tensors overlap or leave a gap at byte " + std::to_string(at));
     at = end;
   }
   if (at != data_size)
@@ -135,7 +138,8 @@ std::string to_safetensors(const TensorFile& file) {
   text.resize((text.size() + 7) / 8 * 8, ' ');
   std::string bytes;
   bytes.reserve(8 + text.size() + at);
-  for (int i = 0; i < 8; ++i) bytes.push_back(static_cast<char>(static_cast<std::uint64_t>(text.size()) >> (8 * i) & 0xff));
+  for (int i = 0; i < 8; ++i)
+    bytes.push_back(static_cast<char>(static_cast<std::uint64_t>(text.size()) >> (8 * i) & 0xff));
   bytes += text;
   for (const NamedTensor& tensor : file.tensors)
     bytes.append(reinterpret_cast<const char*>(tensor.values.data()), tensor.values.size() * 4);

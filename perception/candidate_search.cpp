@@ -38,13 +38,38 @@ std::vector<Candidate> best_distinct(std::vector<Candidate> candidates, const st
   return kept;
 }
 
-// One scorer a thread, on one level.
-struct Level {
-  Level(const Observation& observation, const Explanation& scene_, int threads) : scene(&scene_) {
-    for (int i = 0; i < threads; ++i) scorers.emplace_back(observation);
+// One level of the pyramid with a scorer for each thread.
+class Level {
+ public:
+  Level(const std::vector<ObjectModel>& models, const Observation& observation, const Explanation& explanation,
+        const std::vector<PlacedObject>& objects, double penetration, int threads)
+      : models_(models), explanation_(explanation), objects_(objects), penetration_(penetration) {
+    for (int i = 0; i < threads; ++i) scorers_.emplace_back(observation);
   }
-  const Explanation* scene;
-  std::vector<PoseScorer> scorers;
+
+  double gain(int worker, const PlacedObject& placed) {
+    return scorers_[worker].gain(explanation_, models_[placed.model].object->mesh, placed.T_world_object) -
+           penetration_cost(models_, placed, objects_, penetration_);
+  }
+
+  void align_and_climb(int worker, const AlignOptions& align, const ClimbOptions& climbing, Candidate& candidate) {
+    PlacedObject& placed = candidate.placed;
+    const auto objective = [&](const Pose& pose) { return gain(worker, {placed.model, pose, placed.freedom}); };
+    const ObjectModel& model = models_[placed.model];
+    const Pose aligned = align_to_readings(scorers_[worker], explanation_, model.object->mesh, placed.T_world_object,
+                                           placed.freedom, align);
+    const Pose start = objective(aligned) > objective(placed.T_world_object) ? aligned : placed.T_world_object;
+    const ScoredPose climbed = climb(objective, start, placed.freedom, model.radius, climbing);
+    placed.T_world_object = climbed.T_world_object;
+    candidate.gain = climbed.score;
+  }
+
+ private:
+  const std::vector<ObjectModel>& models_;
+  const Explanation& explanation_;
+  const std::vector<PlacedObject>& objects_;
+  double penetration_;
+  std::vector<PoseScorer> scorers_;
 };
 
 // Applies improve(worker, candidate) to every candidate.
@@ -52,21 +77,6 @@ template <class Improve>
 void improve_all(std::vector<Candidate>& candidates, int threads, const Improve& improve) {
   parallel_for(static_cast<int>(candidates.size()), threads,
                [&](int worker, int i) { improve(worker, candidates[i]); });
-}
-
-void align_and_climb(const std::vector<ObjectModel>& models, Level& level, int worker, const AlignOptions& align,
-                     const ClimbOptions& climbing, Candidate& candidate) {
-  const ObjectModel& model = models[candidate.placed.model];
-  const TriangleMesh& mesh = model.object->mesh;
-  PoseScorer& scorer = level.scorers[worker];
-  const PoseObjective gain = [&](const Pose& pose) { return scorer.gain(*level.scene, mesh, pose); };
-  PlacedObject& placed = candidate.placed;
-  const Pose aligned =
-      align_to_readings(scorer, *level.scene, mesh, placed.T_world_object, placed.freedom, align);
-  const Pose start = gain(aligned) > gain(placed.T_world_object) ? aligned : placed.T_world_object;
-  const ScoredPose climbed = climb(gain, start, placed.freedom, model.radius, climbing);
-  placed.T_world_object = climbed.T_world_object;
-  candidate.gain = climbed.score;
 }
 
 }  // namespace
@@ -94,16 +104,16 @@ PyramidScene explain(const ObservationPyramid& pyramid, const std::vector<Object
     }
     return scene;
   };
-  return {on_level(pyramid.coarse), on_level(pyramid.medium), on_level(pyramid.fine)};
+  return {placed, on_level(pyramid.coarse), on_level(pyramid.medium), on_level(pyramid.fine)};
 }
 
 std::vector<Candidate> find_candidates(const std::vector<ObjectModel>& models, const ObservationPyramid& pyramid,
                                        const PyramidScene& scene, const Target& target, const Camera& camera,
-                                       const Pose& T_world_camera, const std::vector<double>& heights,
-                                       const CandidateOptions& options) {
+                                       const Pose& T_world_camera, const CandidateOptions& options) {
   std::vector<PoseHypothesis> hypotheses;
   const HypothesisOptions guessing;
-  add_resting_hypotheses(models, target, camera, T_world_camera, heights, guessing, hypotheses);
+  add_resting_hypotheses(models, target, camera, T_world_camera, support_heights(models, scene.objects),
+                         guessing, hypotheses);
   add_face_hypotheses(models, target, guessing, hypotheses);
   add_face_pair_hypotheses(models, target, guessing, hypotheses);
 
@@ -111,25 +121,27 @@ std::vector<Candidate> find_candidates(const std::vector<ObjectModel>& models, c
   for (const PoseHypothesis& guess : hypotheses) {
     candidates.push_back({{guess.model, guess.T_world_object, guess.freedom}, 0.0});
   }
-  Level coarse(pyramid.coarse, scene.coarse, options.threads), medium(pyramid.medium, scene.medium, options.threads),
-      fine(pyramid.fine, scene.fine, options.threads);
+  const auto level = [&](const Observation& observation, const Explanation& explanation, double leniency) {
+    return Level(models, observation, explanation, scene.objects, leniency * options.penetration, options.threads);
+  };
+  Level coarse = level(pyramid.coarse, scene.coarse, 6.0), medium = level(pyramid.medium, scene.medium, 3.0),
+        fine = level(pyramid.fine, scene.fine, 1.0);
   improve_all(candidates, options.threads, [&](int worker, Candidate& candidate) {
-    candidate.gain = coarse.scorers[worker].gain(*coarse.scene, models[candidate.placed.model].object->mesh,
-                                                 candidate.placed.T_world_object);
+    candidate.gain = coarse.gain(worker, candidate.placed);
   });
   candidates = best_distinct(std::move(candidates), models, options.coarse_kept, options.coarse_kept / 16);
   improve_all(candidates, options.threads, [&](int worker, Candidate& candidate) {
-    align_and_climb(models, coarse, worker, {3, 0.02, 0.01}, {0.004, 0.002, 1}, candidate);
+    coarse.align_and_climb(worker, {3, 0.02, 0.01}, {0.004, 0.002, 1}, candidate);
   });
   candidates = best_distinct(std::move(candidates), models, options.medium_kept, options.medium_kept / 16);
   improve_all(candidates, options.threads, [&](int worker, Candidate& candidate) {
-    align_and_climb(models, medium, worker, {3, 0.012, 0.006}, {0.002, 0.001, 2}, candidate);
+    medium.align_and_climb(worker, {3, 0.012, 0.006}, {0.002, 0.001, 2}, candidate);
   });
   candidates = best_distinct(std::move(candidates), models, options.fine_kept, 1);
   improve_all(candidates, options.threads, [&](int worker, Candidate& candidate) {
-    align_and_climb(models, fine, worker, {2, 0.008, 0.006}, {0.001, 0.0005, 2}, candidate);
+    fine.align_and_climb(worker, {2, 0.008, 0.006}, {0.001, 0.0005, 2}, candidate);
   });
-  return best_distinct(std::move(candidates), models, options.fine_kept, 0);
+  return best_distinct(std::move(candidates), models, options.fine_kept, 1);
 }
 
 bool alike(const ObjectModel& model, const Pose& a, const Pose& b, double distance, double angle) {

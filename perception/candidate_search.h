@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "perception/contact_costs.h"
 #include "perception/pose_hypotheses.h"
 
 namespace dofusion {
@@ -16,14 +17,9 @@ ObservationPyramid observe_pyramid(const DepthImage& depth, const Camera& camera
                                    const LabelImage& labels, const PixelWindow& window, const DepthSigma& sigma,
                                    int coarse_stride);
 
-struct PlacedObject {
-  int model = 0;  // index into the models
-  Pose T_world_object = Pose::Identity();
-  Freedom freedom = Freedom::kFree;
-};
-
-// The scene that already stands, on every level.
+// The scene that already stands, as every level explains it.
 struct PyramidScene {
+  std::vector<PlacedObject> objects;
   Explanation coarse, medium, fine;
 };
 
@@ -32,22 +28,22 @@ PyramidScene explain(const ObservationPyramid& pyramid, const std::vector<Object
 
 struct Candidate {
   PlacedObject placed;
-  double gain = 0.0;  // by which it lowers the cost of the fine level
+  double gain = 0.0;  // by which it lowers the cost of the fine level, less what it overlaps
 };
 
 struct CandidateOptions {
   int threads = 1;
   int coarse_kept = 240;  // hypotheses that are aligned
   int medium_kept = 48;   // … and climbed
-  int fine_kept = 12;     // … and returned at most
+  int fine_kept = 12;     // … and returned; more if objects would be missing
+  double penetration = 0.0005;   // metres, one sigma; on the coarser levels more
 };
 
 // Guesses from the target, scored coarsely; the best are aligned, climbed and scored exactly. The best first, no two
-// alike. `heights`: level surfaces to rest on, metres.
+// alike, and the best of every object among them.
 std::vector<Candidate> find_candidates(const std::vector<ObjectModel>& models, const ObservationPyramid& pyramid,
                                        const PyramidScene& scene, const Target& target, const Camera& camera,
-                                       const Pose& T_world_camera, const std::vector<double>& heights,
-                                       const CandidateOptions& options);
+                                       const Pose& T_world_camera, const CandidateOptions& options);
 
 // The same object in (nearly) the same place, its symmetries considered.
 bool alike(const ObjectModel& model, const Pose& a, const Pose& b, double distance, double angle);

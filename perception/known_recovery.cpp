@@ -11,7 +11,7 @@
 namespace dofusion {
 namespace {
 
-constexpr int kWindowMargin = 12;         // pixels around a cluster: free space that must stay free
+constexpr int kWindowMargin = 24;         // pixels around a cluster: free space that must stay free
 constexpr double kCoarsePixels = 350.0;   // of an object on the coarse level
 
 SceneSearchOptions search_options(const KnownRecoveryOptions& options) {
@@ -165,12 +165,15 @@ std::vector<RecoveredObject> recover_known(const DepthImage& depth, const Camera
     cluster.face_map = &face_map;
     cluster.camera = camera;
     cluster.T_world_camera = table.T_world_camera;
-    cluster.own_labels = own;
+    for (const auto& [label, unused] : points) {
+      const bool is_own = std::find(own.begin(), own.end(), label) != own.end();
+      if (!is_own) cluster.other_labels.push_back(static_cast<std::uint8_t>(label));
+    }
     cluster.window = window_of(labels, own);
     cluster.pyramid = observe_pyramid(depth, camera, table, labels, cluster.window, sigma,
                                       coarse_stride(models, camera, points.at(own.front()), table.T_world_camera));
     const std::vector<SceneHypothesis> scenes = search_scenes(models, cluster, search);
-    const SceneHypothesis chosen = options.settle ? choose_settled(models, cluster, scenes, search,
+    const SceneHypothesis chosen = options.settle ? choose_settled(models, cluster, scenes, search.costs,
                                                                    {options.settle_distance, options.settle_angle})
                                                   : scenes.front();
     for (RecoveredObject& object : report(models, cluster, chosen.objects, options.min_score)) {

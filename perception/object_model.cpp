@@ -58,6 +58,38 @@ double probe_distance(const ObjectModel& a, const ObjectModel& b, const Pose& T_
   return least;
 }
 
+// The deepest a's probes lie in b.
+double probe_depth(const ObjectModel& a, const ObjectModel& b, const Pose& T_b_a) {
+  if (b.half_spaces.empty()) return std::max(0.0, -probe_distance(a, b, T_b_a));
+  double deepest = 0.0;
+  for (const Eigen::Vector3d& probe : a.probes) {
+    const Eigen::Vector3d p_b = T_b_a * probe;
+    double depth = std::numeric_limits<double>::infinity();
+    for (const auto& [normal, offset] : b.half_spaces) {
+      depth = std::min(depth, offset - normal.dot(p_b));
+      if (depth <= deepest) break;
+    }
+    deepest = std::max(deepest, depth);
+  }
+  return deepest;
+}
+
+std::vector<std::pair<Eigen::Vector3d, double>> half_spaces_of(const Object& object) {
+  constexpr int kMostHalfSpaces = 64;
+  std::vector<std::pair<Eigen::Vector3d, double>> half_spaces;
+  const TriangleMesh& mesh = object.mesh;
+  if (!object.convex) return half_spaces;
+  for (const Eigen::Vector3i& t : mesh.triangles) {
+    const Eigen::Vector3d &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
+    const Eigen::Vector3d normal = (b - a).cross(c - a).normalized();
+    const bool known = std::any_of(half_spaces.begin(), half_spaces.end(),
+                                   [&](const auto& other) { return (other.first - normal).norm() < 1e-4; });
+    if (!known) half_spaces.emplace_back(normal, normal.dot(a));
+  }
+  if (half_spaces.size() > kMostHalfSpaces) half_spaces.clear();
+  return half_spaces;
+}
+
 double outer_radius(const Object& object) {
   double largest = 0.0;
   for (const Eigen::Vector3d& vertex : object.mesh.vertices) largest = std::max(largest, vertex.norm());
@@ -72,6 +104,7 @@ ObjectModel::ObjectModel(const ObjectPtr& object_)
       faces(planar_faces(object_->mesh)),
       distinct(distinct_faces(faces, symmetries)),
       resting(distinct_rests(object_->mesh, symmetries)),
+      half_spaces(half_spaces_of(*object_)),
       probes(make_probes(*object_)),
       distance(object_->mesh),
       radius(outer_radius(*object_)) {}
@@ -81,6 +114,13 @@ double clearance(const ObjectModel& a, const Pose& T_world_a, const ObjectModel&
   if (apart > 0.5 * (a.radius + b.radius)) return apart;
   const Pose T_b_a = T_world_b.inverse() * T_world_a;
   return std::min(probe_distance(a, b, T_b_a), probe_distance(b, a, T_b_a.inverse()));
+}
+
+double overlap(const ObjectModel& a, const Pose& T_world_a, const ObjectModel& b, const Pose& T_world_b) {
+  const double apart = (T_world_a.translation() - T_world_b.translation()).norm() - a.radius - b.radius;
+  if (apart > 0.0) return 0.0;
+  const Pose T_b_a = T_world_b.inverse() * T_world_a;
+  return std::max(probe_depth(a, b, T_b_a), probe_depth(b, a, T_b_a.inverse()));
 }
 
 double lowest_point(const ObjectModel& model, const Pose& T_world_object) {

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "perception/png.h"
@@ -22,10 +24,11 @@ constexpr std::array<Rgb, 10> kPalette{{{66, 120, 190},
                                         {100, 110, 140},
                                         {225, 150, 190}}};
 constexpr Rgb kTableColour{205, 205, 202};
-constexpr Rgb kNothingColour{0, 0, 0};
+constexpr Rgb kNoReading{0, 0, 0};
+constexpr Rgb kUnlabelled{90, 90, 95};
 
-Rgb label_colour(std::uint8_t label) {
-  if (label == kLabelNothing) return kNothingColour;
+Rgb label_colour(std::uint8_t label, bool reading) {
+  if (label == kLabelNothing) return reading ? kUnlabelled : kNoReading;
   return label == kLabelTable ? kTableColour : object_colour(label - kLabelFirstObject);
 }
 
@@ -48,28 +51,48 @@ Rgb turbo(double t) {
           polynomial({0.10667330, 12.64194608, -60.58204836, 110.36276771, -89.90310912, 27.34824973})};
 }
 
-// Shading in [0, 1] of the surface seen at a pixel by a headlight, from depth differences a few pixels wide.
+constexpr double kSameSurface = 0.02;  // metres between neighbours; more is another surface
+
+// Every reading's mean with its neighbours on the same surface, first along rows, then along columns.
+DepthImage smoothed(const DepthImage& depth) {
+  constexpr int kReach = 4;  // pixels
+  DepthImage source = depth, result = depth;
+  for (const auto& [down, right] : {std::pair(0, 1), std::pair(1, 0)}) {
+    for (int row = 0; row < depth.height; ++row)
+      for (int column = 0; column < depth.width; ++column) {
+        const float here = source.at(row, column);
+        float sum = 0.0f;
+        int count = 0;
+        for (int k = -kReach; k <= kReach; ++k) {
+          const int r = row + k * down, c = column + k * right;
+          if (!source.contains(r, c) || std::abs(source.at(r, c) - here) > kSameSurface) continue;
+          sum += source.at(r, c);
+          ++count;
+        }
+        result.at(row, column) = here > 0.0f ? sum / static_cast<float>(count) : 0.0f;
+      }
+    source = result;
+  }
+  return result;
+}
+
+// Shading in [0, 1] by a light at the camera of the surface seen at a pixel.
 double headlight(const DepthImage& depth, const Camera& camera, int row, int column) {
-  constexpr int kReach = 3;          // pixels; evens out the noise
-  constexpr double kLargestStep = 0.02;  // metres; more is another surface
+  constexpr int kReach = 3;          // pixels
   constexpr double kUnknown = 0.8;
-  const double z = depth.at(row, column);
-  const auto difference = [&](int down, int right) -> std::optional<Eigen::Vector3d> {
-    std::array<Eigen::Vector3d, 2> ends;
-    for (int k = 0; k < 2; ++k) {
-      const int sign = k == 0 ? -1 : 1;
+  // From one to the other side of the pixel, as far as they are on its surface.
+  const auto difference = [&](int down, int right) -> Eigen::Vector3d {
+    const auto end = [&](int sign) {
       int r = row + sign * down, c = column + sign * right;
-      const bool usable = depth.contains(r, c) && depth.at(r, c) > 0.0f && std::abs(depth.at(r, c) - z) < kLargestStep;
-      if (!usable) r = row, c = column;
-      ends[static_cast<std::size_t>(k)] = unproject(camera, c, r, depth.at(r, c));
-    }
-    if (ends[0] == ends[1]) return std::nullopt;
-    return ends[1] - ends[0];
+      const bool same = depth.contains(r, c) && std::abs(depth.at(r, c) - depth.at(row, column)) < kSameSurface;
+      if (!same) r = row, c = column;
+      return unproject(camera, c, r, depth.at(r, c));
+    };
+    return end(1) - end(-1);
   };
-  const auto across = difference(0, kReach), along = difference(kReach, 0);
-  if (!across || !along) return kUnknown;
-  const Eigen::Vector3d ray = unproject(camera, column, row, 1.0);
-  return std::abs(across->cross(*along).normalized().dot(ray.normalized()));
+  const Eigen::Vector3d normal = difference(0, kReach).cross(difference(kReach, 0));
+  if (normal.isZero(1e-12)) return kUnknown;
+  return std::abs(normal.normalized().dot(unproject(camera, column, row, 1.0).normalized()));
 }
 
 }  // namespace
@@ -81,7 +104,7 @@ Rgb object_colour(int index) {
 }
 
 ColourImage depth_picture(const DepthImage& depth) {
-  ColourImage picture(depth.width, depth.height, kNothingColour);
+  ColourImage picture(depth.width, depth.height, kNoReading);
   std::vector<float> readings;
   std::copy_if(depth.pixels.begin(), depth.pixels.end(), std::back_inserter(readings), [](float z) { return z > 0; });
   if (readings.empty()) return picture;
@@ -93,7 +116,10 @@ ColourImage depth_picture(const DepthImage& depth) {
   const double near = percentile(0.01), far = percentile(0.99);
   const double range = std::max(far - near, 1e-6);
   for (std::size_t i = 0; i < depth.pixels.size(); ++i) {
-    if (depth.pixels[i] > 0.0f) picture.pixels[i] = turbo(std::clamp((far - depth.pixels[i]) / range, 0.0, 1.0));
+    // The map's ends are nearly black.
+    constexpr double kDarkEnds = 0.06;
+    const double t = std::clamp((far - depth.pixels[i]) / range, 0.0, 1.0);
+    if (depth.pixels[i] > 0.0f) picture.pixels[i] = turbo(kDarkEnds + (1.0 - 2.0 * kDarkEnds) * t);
   }
   return picture;
 }
@@ -104,16 +130,14 @@ ColourImage segmentation_picture(const LabelImage& labels, const DepthImage& dep
                                 " pixels for a depth image of " + std::to_string(depth.width) + "x" +
                                 std::to_string(depth.height));
   constexpr double kAmbient = 0.35;
+  const DepthImage smooth = smoothed(depth);
   ColourImage picture(labels.width, labels.height);
   for (int row = 0; row < labels.height; ++row)
     for (int column = 0; column < labels.width; ++column) {
-      const std::uint8_t label = labels.at(row, column);
-      if (label == kLabelNothing && depth.at(row, column) > 0.0f) {
-        picture.at(row, column) = scaled_colour({90, 90, 95}, headlight(depth, camera, row, column));
-        continue;
-      }
-      const double light = depth.at(row, column) > 0.0f ? headlight(depth, camera, row, column) : 0.0;
-      picture.at(row, column) = scaled_colour(label_colour(label), kAmbient + (1.0 - kAmbient) * light);
+      const bool reading = smooth.at(row, column) > 0.0f;
+      const double light = reading ? headlight(smooth, camera, row, column) : 0.0;
+      const Rgb colour = label_colour(labels.at(row, column), reading);
+      picture.at(row, column) = scaled_colour(colour, kAmbient + (1.0 - kAmbient) * light);
     }
   return picture;
 }

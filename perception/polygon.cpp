@@ -7,6 +7,8 @@
 namespace dofusion {
 namespace {
 
+constexpr double kSamePoint = 1e-7;
+
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 }  // namespace
@@ -17,6 +19,10 @@ Polygon convex_hull_2d(std::vector<Eigen::Vector2d> points) {
   });
   if (points.size() < 3) return points;
   Polygon hull;
+  points.erase(std::unique(points.begin(), points.end(),
+                           [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return (a - b).norm() < kSamePoint; }),
+               points.end());
+  if (points.size() < 3) return points;
   const auto add = [&](const Eigen::Vector2d& p, std::size_t keep) {
     while (hull.size() >= keep + 2 && cross(hull.back() - hull[hull.size() - 2], p - hull.back()) <= 0.0) hull.pop_back();
     hull.push_back(p);
@@ -66,7 +72,7 @@ std::vector<HalfPlane> half_planes(const Polygon& polygon) {
   std::vector<HalfPlane> planes;
   for (std::size_t i = 0; i < polygon.size(); ++i) {
     const Eigen::Vector2d edge = polygon[(i + 1) % polygon.size()] - polygon[i];
-    if (edge.norm() < 1e-12) continue;
+    if (edge.norm() < 10.0 * kSamePoint) continue;
     const Eigen::Vector2d normal = Eigen::Vector2d(edge.y(), -edge.x()).normalized();
     planes.push_back({normal, normal.dot(polygon[i])});
   }

@@ -1,6 +1,7 @@
 #include "perception/pose_refinement.h"
 
 #include <cmath>
+#include <vector>
 
 #include <Eigen/Cholesky>
 
@@ -15,6 +16,17 @@ struct NormalEquations {
   Vector6d g = Vector6d::Zero();
 };
 
+// Unit normals of the triangles, in the camera's frame.
+std::vector<Eigen::Vector3d> triangle_normals(const TriangleMesh& mesh, const Eigen::Matrix3d& R_camera_object) {
+  std::vector<Eigen::Vector3d> normals;
+  normals.reserve(mesh.triangles.size());
+  for (const Eigen::Vector3i& t : mesh.triangles) {
+    const Eigen::Vector3d &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
+    normals.push_back((R_camera_object * (b - a).cross(c - a)).normalized());
+  }
+  return normals;
+}
+
 // Sums over the pixels that see the object within the gate. Moving a surface point by d moves the depth along its
 // pixel's ray by n·d / n·ray.
 NormalEquations depth_equations(PoseScorer& scorer, const Explanation& scene, const TriangleMesh& mesh,
@@ -23,6 +35,7 @@ NormalEquations depth_equations(PoseScorer& scorer, const Explanation& scene, co
   const Observation& seen = scorer.observation();
   const Pose T_camera_object = seen.T_camera_world * T_world_object;
   const Eigen::Matrix3d R_world_camera = seen.T_camera_world.linear().transpose();
+  const std::vector<Eigen::Vector3d> normals = triangle_normals(mesh, T_camera_object.linear());
   NormalEquations sums;
   for (int row = 0; row < patch.height; ++row) {
     for (int column = 0; column < patch.width; ++column) {
@@ -31,10 +44,7 @@ NormalEquations depth_equations(PoseScorer& scorer, const Explanation& scene, co
       const int v = patch.v0 + row, u = patch.u0 + column;
       const double z = 1.0 / patch.inverse_depth[i], reading = seen.depth.at(v, u);
       if (reading <= 0.0 || std::abs(reading - z) > gate || z > scene.depth.at(v, u) + gate) continue;
-      const Eigen::Vector3i& t = mesh.triangles[patch.face[i]];
-      const Eigen::Vector3d normal = T_camera_object.linear() * (mesh.vertices[t[1]] - mesh.vertices[t[0]])
-                                                                    .cross(mesh.vertices[t[2]] - mesh.vertices[t[0]])
-                                                                    .normalized();
+      const Eigen::Vector3d& normal = normals[patch.face[i]];
       const Eigen::Vector3d ray = pixel_ray(seen.camera, u, v);
       const double facing = normal.dot(ray);
       if (std::abs(facing) < 0.1) continue;  // grazing: a hair's breadth sideways is a long way in depth
@@ -43,10 +53,11 @@ NormalEquations depth_equations(PoseScorer& scorer, const Explanation& scene, co
       Vector6d J;
       J << slope, arm.cross(slope);
       const double weight = 2.0 * seen.precision.at(v, u);
-      sums.H += weight * J * J.transpose();
+      sums.H.selfadjointView<Eigen::Lower>().rankUpdate(J, weight);
       sums.g += weight * (reading - z) * J;
     }
   }
+  sums.H = Matrix6d(sums.H.selfadjointView<Eigen::Lower>());
   return sums;
 }
 

@@ -15,17 +15,42 @@ float table_depth(const Camera& camera, const Pose& T_world_camera, double u, do
   return static_cast<float>(std::min<double>(kNoTable, -T_world_camera.translation().z() / fall));
 }
 
-// What the readings cost under a surface of the given depth and facing; scalars and Eigen's arrays alike. `zero`
-// tells them apart.
-template <class T>
-auto reading_cost(const T& reading, const T& missing, const T& precision, const T& scene, const T& facing) {
-  using std::max;
-  using std::min;
-  const T difference = reading - scene;
-  const T behind = max(difference, 0.0f), nearer = min(difference, 0.0f);
-  const T faces_camera = min(max((facing - kGrazingCosine) / (kFacingCosine - kGrazingCosine), 0.0f), 1.0f);
-  return T(min(T(behind * behind * precision), kBehindCost) + min(T(nearer * nearer * precision), kNearerCost) +
-           missing * faces_camera * kMissingCost);
+// N pixels side by side: Eigen takes vector registers for them on every compiler.
+template <int N>
+using Pixels = Eigen::Array<float, N, 1>;
+
+template <int N>
+Pixels<N> load(const float* values) {
+  return Eigen::Map<const Pixels<N>>(values);
+}
+
+// What readings cost under a surface at the depth `scene` that faces the camera by the cosine `facing`.
+template <int N>
+Pixels<N> reading_cost(const Pixels<N>& reading, const Pixels<N>& missing, const Pixels<N>& precision,
+                       const Pixels<N>& scene, const Pixels<N>& facing) {
+  const Pixels<N> behind = (reading - scene).max(0.0f), nearer = (reading - scene).min(0.0f);
+  const Pixels<N> faces_camera =
+      ((facing - kGrazingCosine) * (1.0f / (kFacingCosine - kGrazingCosine))).max(0.0f).min(1.0f);
+  return (behind * behind * precision).min(kBehindCost) + (nearer * nearer * precision).min(kNearerCost) +
+         missing * faces_camera * kMissingCost;
+}
+
+float reading_cost_at(const Observation& seen, std::size_t pixel, float scene, float facing) {
+  using One = Pixels<1>;
+  return reading_cost<1>(One(seen.depth.pixels[pixel]), One(seen.missing.pixels[pixel]),
+                         One(seen.precision.pixels[pixel]), One(scene), One(facing))[0];
+}
+
+// By how much N pixels of a patch lower the cost of the scene; 0 where the scene is nearer.
+template <int N>
+Pixels<N> gain_of_pixels(const Observation& seen, const Explanation& scene, std::size_t in_scene,
+                         const RasterPatch& patch, std::size_t in_patch) {
+  const Pixels<N> w = load<N>(&patch.inverse_depth[in_patch]);
+  const Pixels<N> nearest = ((w * load<N>(&scene.depth.pixels[in_scene]) - 1.0f) * 1e7f).max(0.0f).min(1.0f);
+  const Pixels<N> cost = reading_cost<N>(load<N>(&seen.depth.pixels[in_scene]), load<N>(&seen.missing.pixels[in_scene]),
+                                         load<N>(&seen.precision.pixels[in_scene]), w.max(1e-6f).inverse(),
+                                         load<N>(&patch.facing[in_patch]));
+  return nearest * (load<N>(&scene.cost.pixels[in_scene]) - cost);
 }
 
 // Cosine between the ray to the window's middle and the table's normal.
@@ -50,6 +75,7 @@ Observation observe(const DepthImage& depth, const Camera& camera, const Table& 
   seen.table_facing = table_facing_at(seen.camera, table.T_world_camera);
   seen.depth = DepthImage(seen.camera.width, seen.camera.height, 0.0f);
   seen.precision = Image<float>(seen.camera.width, seen.camera.height, 0.0f);
+  seen.missing = Image<float>(seen.camera.width, seen.camera.height, 1.0f);
   seen.background = DepthImage(seen.camera.width, seen.camera.height, kNoTable);
   seen.labels = LabelImage(seen.camera.width, seen.camera.height, kLabelNothing);
   for (int row = 0; row < seen.camera.height; ++row) {
@@ -57,8 +83,11 @@ Observation observe(const DepthImage& depth, const Camera& camera, const Table& 
       const int v = window.v0 + row * window.stride, u = window.u0 + column * window.stride;
       const float z = depth.at(v, u);
       seen.depth.at(row, column) = is_valid_depth(z) ? z : 0.0f;
-      const double sigma = sigma_of(seen.depth.at(row, column)) + kFloor;
-      seen.precision.at(row, column) = static_cast<float>(0.5 / (sigma * sigma));
+      if (seen.depth.at(row, column) > 0.0f) {
+        const double sigma = sigma_of(z) + kFloor;
+        seen.precision.at(row, column) = static_cast<float>(0.5 / (sigma * sigma));
+        seen.missing.at(row, column) = 0.0f;
+      }
       seen.background.at(row, column) = table_depth(camera, table.T_world_camera, u, v);
       seen.labels.at(row, column) = labels.at(v, u);
     }
@@ -78,8 +107,7 @@ Explanation PoseScorer::empty_scene() const {
   scene.cost = Image<float>(scene.depth.width, scene.depth.height);
   for (std::size_t i = 0; i < scene.depth.pixels.size(); ++i) {
     scene.cost.pixels[i] =
-        reading_cost(observation_->depth.pixels[i], scene.depth.pixels[i], observation_->precision.pixels[i],
-                     observation_->table_facing);
+        reading_cost_at(*observation_, i, scene.depth.pixels[i], observation_->table_facing);
   }
   return scene;
 }
@@ -90,36 +118,30 @@ void PoseScorer::add(const TriangleMesh& mesh, const Pose& T_world_object, Expla
     for (int column = 0; column < patch.width; ++column) {
       const std::size_t i = static_cast<std::size_t>(row) * patch.width + column;
       const float w = patch.inverse_depth[i];
-      const int v = patch.v0 + row, u = patch.u0 + column;
-      if (w <= 0.0f || 1.0f / w >= scene.depth.at(v, u)) continue;
-      scene.depth.at(v, u) = 1.0f / w;
-      scene.cost.at(v, u) = reading_cost(observation_->depth.at(v, u), 1.0f / w, observation_->precision.at(v, u),
-                                         patch.facing[patch.face[i]]);
+      const std::size_t pixel = static_cast<std::size_t>(patch.v0 + row) * scene.depth.width + patch.u0 + column;
+      if (w <= 0.0f || 1.0f / w >= scene.depth.pixels[pixel]) continue;
+      scene.depth.pixels[pixel] = 1.0f / w;
+      scene.cost.pixels[pixel] = reading_cost_at(*observation_, pixel, 1.0f / w, patch.facing[i]);
     }
   }
 }
 
 double PoseScorer::gain(const Explanation& scene, const TriangleMesh& mesh, const Pose& T_world_object) {
+  constexpr int kSideBySide = 8;
   const RasterPatch& patch = render(mesh, T_world_object);
-  double sum = 0.0;
+  Pixels<kSideBySide> sums = Pixels<kSideBySide>::Zero();
   for (int row = 0; row < patch.height; ++row) {
     const std::size_t in_patch = static_cast<std::size_t>(row) * patch.width;
     const std::size_t in_scene = static_cast<std::size_t>(patch.v0 + row) * scene.depth.width + patch.u0;
-    const float* inverse_depth = &patch.inverse_depth[in_patch];
-    const std::int32_t* face = &patch.face[in_patch];
-    const float* scene_depth = &scene.depth.pixels[in_scene];
-    const float* scene_cost = &scene.cost.pixels[in_scene];
-    const float* reading = &observation_->depth.pixels[in_scene];
-    const float* precision = &observation_->precision.pixels[in_scene];
-    float row_sum = 0.0f;
-    for (int i = 0; i < patch.width; ++i) {
-      const float w = inverse_depth[i];
-      const float cost = reading_cost(reading[i], 1.0f / std::max(w, 1e-6f), precision[i], patch.facing[face[i]]);
-      row_sum += w * scene_depth[i] > 1.0f ? scene_cost[i] - cost : 0.0f;
+    int i = 0;
+    for (; i + kSideBySide <= patch.width; i += kSideBySide) {
+      sums += gain_of_pixels<kSideBySide>(*observation_, scene, in_scene + i, patch, in_patch + i);
     }
-    sum += row_sum;
+    for (; i < patch.width; ++i) {
+      sums[0] += gain_of_pixels<1>(*observation_, scene, in_scene + i, patch, in_patch + i)[0];
+    }
   }
-  return sum;
+  return sums.cast<double>().sum();
 }
 
 PixelCounts PoseScorer::count(const Explanation& scene, const TriangleMesh& mesh, const Pose& T_world_object) {

@@ -28,7 +28,7 @@ struct Settled {
 };
 
 Settled settle(const std::vector<ObjectModel>& models, const Cluster& cluster, const SceneHypothesis& scene,
-               const SceneSearchOptions& options, const SettleLimits& limits) {
+               const SceneCosts& costs, const SettleLimits& limits) {
   std::vector<ObjectPtr> objects;
   std::vector<Pose> poses;
   for (const PlacedObject& object : scene.objects) {
@@ -44,20 +44,20 @@ Settled settle(const std::vector<ObjectModel>& models, const Cluster& cluster, c
     }
     settled.scene.objects[i].T_world_object = result.T_world_object[i];
   }
-  settled.scene.score = scene_score(models, cluster, settled.scene.objects, true, options);
+  settled.scene.score = scene_score(models, cluster, settled.scene.objects, true, costs);
   return settled;
 }
 
 }  // namespace
 
 SceneHypothesis choose_settled(const std::vector<ObjectModel>& models, const Cluster& cluster,
-                               const std::vector<SceneHypothesis>& scenes, const SceneSearchOptions& options,
+                               const std::vector<SceneHypothesis>& scenes, const SceneCosts& costs,
                                const SettleLimits& limits) {
   SceneHypothesis best = scenes.front();
   double best_score = -1e300;
   for (const SceneHypothesis& seen : scenes) {
-    if (seen.objects.empty()) continue;
-    const Settled settled = settle(models, cluster, seen, options, limits);
+    if (seen.objects.empty() || seen.score <= best_score) continue;
+    const Settled settled = settle(models, cluster, seen, costs, limits);
     const double allowed = kWorsePerPixel * visible_pixels(models, cluster, seen.objects);
     const bool accept = settled.stands && settled.scene.score >= seen.score - allowed;
     const double score = accept ? std::max(seen.score, settled.scene.score) : seen.score - kFallsOver;

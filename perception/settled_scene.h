@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "perception/scene_search.h"
+#include "perception/scene_score.h"
 
 namespace dofusion {
 
@@ -15,7 +15,7 @@ struct SettleLimits {
 // Settles the scenes (best first) and takes the one with the best score among them, those that fall over handicapped.
 // Its objects have their settled poses if these explain the image about as well, else the seen ones.
 SceneHypothesis choose_settled(const std::vector<ObjectModel>& models, const Cluster& cluster,
-                               const std::vector<SceneHypothesis>& scenes, const SceneSearchOptions& options,
+                               const std::vector<SceneHypothesis>& scenes, const SceneCosts& costs,
                                const SettleLimits& limits);
 
 }  // namespace dofusion

@@ -16,11 +16,11 @@ const Eigen::Vector3d kUp = Eigen::Vector3d::UnitZ();
 // What a simpler shape may score less than a freer one.
 double preference(ShapeKind kind) {
   switch (kind) {
-    case ShapeKind::kUprightBox: return 0.04;
-    case ShapeKind::kUprightCylinder: return 0.03;
+    case ShapeKind::kUprightBox: return 0.10;
+    case ShapeKind::kUprightCylinder: return 0.08;
+    case ShapeKind::kUprightPrism: return 0.05;
     case ShapeKind::kTiltedBox:
-    case ShapeKind::kLyingPrism: return 0.02;
-    case ShapeKind::kUprightPrism: return 0.01;
+    case ShapeKind::kLyingPrism: return 0.03;
     case ShapeKind::kHull: return 0.0;
   }
   return 0.0;
@@ -92,6 +92,7 @@ class ShapeFitter {
         tolerance_(3.0 * quantile(view.sigma, 0.5) + options.slack) {}
 
   std::optional<FittedShape> fit() {
+    if (getenv("DBG")) for (auto& f : view_.faces) fprintf(stderr, "   L%d face px %d n %.3f %.3f %.3f off %.3f c %.3f %.3f %.3f lowest %.3f\n", view_.label, f.pixels, f.plane.normal.x(), f.plane.normal.y(), f.plane.normal.z(), f.plane.offset, f.centre.x(), f.centre.y(), f.centre.z(), view_.lowest);
     if (view_.points.size() < 4) return std::nullopt;
     propose_upright();
     propose_lying();
@@ -112,9 +113,11 @@ class ShapeFitter {
   }
 
   void propose(std::optional<TriangleMesh> mesh, const Eigen::Matrix3d& R, ShapeKind kind) {
+    constexpr double kFloats = 0.002;  // metres
     if (mesh) mesh = cut(*mesh, {-kUp, -support_});
-    if (!mesh) return;
+    if (!mesh || bounding_box(*mesh).min.z() > support_ + kFloats) return;
     const double score = score_shape(*mesh, view_, evidence_, options_.slack);
+    if (getenv("DBG")) fprintf(stderr, "   L%d %s score %.3f yaw %.1f z %.0f..%.0f\n", view_.label, to_string(kind).c_str(), score, std::atan2(R(1,0),R(0,0))*57.3, bounding_box(*mesh).min.z()*1e3, bounding_box(*mesh).max.z()*1e3);
     if (best_ && score + preference(kind) <= best_->score + preference(best_->kind)) return;
     best_ = FittedShape{std::move(*mesh), R, kind, score};
   }
@@ -145,15 +148,21 @@ class ShapeFitter {
     const Polygon hull = convex_hull_2d(projected(I));
     if (hull.size() < 3) return;
     const double top = top_height();
-    for (const double yaw : yaw_candidates(hull)) {
-      const Eigen::Matrix3d R = Eigen::AngleAxisd(yaw, kUp).toRotationMatrix();
-      propose(prism(I, footprint_rectangle(yaw, top), support_, top), R, ShapeKind::kUprightBox);
+    for (const double yaw : yaw_candidates(hull)) propose_upright_box(yaw, top);
+    if (best_) {
+      const double yaw = std::atan2(best_->R(1, 0), best_->R(0, 0));
+      for (const double off_deg : {-4.0, -2.0, -1.0, 1.0, 2.0, 4.0}) propose_upright_box(yaw + off_deg * M_PI / 180.0, top);
     }
     const Polygon outline = snapped(simplified(hull, tolerance_, options_.max_corners), I);
     propose(prism(I, outline, support_, top), I, ShapeKind::kUprightPrism);
     if (const std::optional<Circle> circle = fit_circle(hull)) {
       propose(prism(I, round_polygon(*circle, options_.circle_sides), support_, top), I, ShapeKind::kUprightCylinder);
     }
+  }
+
+  void propose_upright_box(double yaw, double top) {
+    const Eigen::Matrix3d R = Eigen::AngleAxisd(yaw, kUp).toRotationMatrix();
+    propose(prism(Eigen::Matrix3d::Identity(), footprint_rectangle(yaw, top), support_, top), R, ShapeKind::kUprightBox);
   }
 
   // From the upright faces, and the least rectangle around the footprint.

@@ -18,11 +18,10 @@ std::string xml_safe(std::string text) {
   return text;
 }
 
-void write_mesh_asset(std::ostream& out, const TriangleMesh& mesh, std::size_t index, MeshPlacement placement,
-                      const std::string& prefix) {
+void write_mesh_asset(std::ostream& out, const TriangleMesh& mesh, std::size_t index, const std::string& file) {
   out << "    <mesh name=\"mesh_" << index << "\"";
-  if (placement == MeshPlacement::kFiles) {
-    out << " file=\"" << xml_safe(prefix) << index << ".obj\"/>\n";
+  if (!file.empty()) {
+    out << " file=\"" << xml_safe(file) << "\"/>\n";
     return;
   }
   out << " vertex=\"";
@@ -57,10 +56,13 @@ const char* colour(std::size_t index) {
 }  // namespace
 
 std::string mjcf_text(const std::vector<ObjectPtr>& objects, const std::vector<Pose>& poses,
-                      const PhysicsOptions& options, MeshPlacement meshes, const std::string& mesh_prefix) {
+                      const PhysicsOptions& options, const std::vector<std::string>& mesh_files) {
   std::ostringstream out;
   out << std::setprecision(9);
-  const std::size_t contacts = 40 + 40 * objects.size();
+  std::size_t contacts = 16;  // room for 16 an object, or for every corner that may lie on the table
+  for (const ObjectPtr& object : objects) {
+    contacts += 16 + (rests_on_corners(*object) ? object->mesh.vertices.size() : 0);
+  }
   out << "<mujoco model=\"dofusion\">\n"
       << "  <compiler angle=\"radian\"/>\n"
       // Elliptic cones, a high impratio and no-slip iterations keep friction from creeping.
@@ -68,7 +70,7 @@ std::string mjcf_text(const std::vector<ObjectPtr>& objects, const std::vector<P
       // A face must rest on more than one point.
       << "    <flag multiccd=\"enable\"/>\n"
       << "  </option>\n"
-      << "  <size nconmax=\"" << contacts << "\" njmax=\"" << 4 * contacts << "\" nstack=\"" << 400000 * (1 + objects.size())
+      << "  <size nconmax=\"" << contacts << "\" njmax=\"" << 4 * contacts << "\" nstack=\"" << 100000 * (1 + objects.size())
       << "\"/>\n"
       << "  <default>\n"
       << "    <geom density=\"" << options.density << "\" friction=\"" << options.friction
@@ -80,7 +82,8 @@ std::string mjcf_text(const std::vector<ObjectPtr>& objects, const std::vector<P
       << "  <visual><global offwidth=\"1280\" offheight=\"960\"/></visual>\n"
       << "  <asset>\n";
   for (std::size_t i = 0; i < objects.size(); ++i) {
-    if (!objects[i]->box_edges) write_mesh_asset(out, objects[i]->mesh, i, meshes, mesh_prefix);
+    if (objects[i]->box_edges) continue;
+    write_mesh_asset(out, objects[i]->mesh, i, mesh_files.empty() ? std::string() : mesh_files[i]);
   }
   out << "  </asset>\n"
       << "  <worldbody>\n"
@@ -105,10 +108,6 @@ std::string mjcf_text(const std::vector<ObjectPtr>& objects, const std::vector<P
   out << "  </worldbody>\n"
       << "</mujoco>\n";
   return out.str();
-}
-
-std::string to_mjcf(const Scene& scene, const PhysicsOptions& options, const std::string& mesh_prefix) {
-  return mjcf_text(scene.objects, scene.T_world_object, options, MeshPlacement::kFiles, mesh_prefix);
 }
 
 }  // namespace dofusion

@@ -117,7 +117,7 @@ struct Simulator::Impl {
 };
 
 Simulator::Simulator(std::vector<ObjectPtr> objects, const PhysicsOptions& options) : impl_(std::make_unique<Impl>()) {
-  impl_->model = compile(mjcf_text(objects, {}, options, MeshPlacement::kInline));
+  impl_->model = compile(mjcf_text(objects, {}, options));
   impl_->data.reset(mj_makeData(impl_->model.get()));
   if (!impl_->data) throw std::runtime_error("MuJoCo: no memory for the simulation");
   impl_->objects = std::move(objects);

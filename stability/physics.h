@@ -69,8 +69,4 @@ class SimulatorCache {
   std::unique_ptr<Impl> impl_;
 };
 
-// The scene as a MuJoCo XML file (MJCF) with free bodies on a table; meshes are named "<prefix><index>.obj" and
-// expected beside the file.
-std::string to_mjcf(const Scene& scene, const PhysicsOptions& options = {}, const std::string& mesh_prefix = "mesh_");
-
 }  // namespace dofusion

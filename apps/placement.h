@@ -1,0 +1,51 @@
+// From a scene and a query to ranked, physics-checked placements.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "diffusion/sampler.h"
+#include "stability/metrics.h"
+#include "stability/physics.h"
+
+namespace dofusion {
+
+struct PlacementOptions {
+  int samples = 32;
+  std::uint64_t seed = 0;
+  int threads = 1;
+  int steps = 50;                 // of the sampler
+  int context = 2;                // objects that the model looks at in one sample; more are taken in turn
+  bool polish = true;             // take the pose at which a stable sample came to rest, if that moves less
+  int trials = 6;                 // of each of the best candidates, with its pose disturbed by what follows
+  int tried = 12;                 // candidates that are tried so
+  double trial_shift = 1.5e-3;    // metres, standard deviation of each coordinate
+  double trial_turn = 0.013;      // radians, of each component of a rotation vector
+  PhysicsOptions physics;
+};
+
+struct Placement {
+  Pose T_world_query = Pose::Identity();
+  SettleStatus status = SettleStatus::kDiverged;
+  bool stable = false;                 // settled, and nothing moved more than 10 % and 10°
+  Displacement displacement;           // the largest over all objects; infinite if the simulation diverged
+  double penetration = 0.0;            // metres, deepest overlap before settling
+  double robustness = 0.0;             // share of the disturbed trials that were stable; 0 if not tried
+  std::vector<Pose> settled;           // context first, the query last
+};
+
+// Candidates from the model, settled with the whole scene, best first: stable ones by robustness, then by how little
+// moves; then the others. The same arguments give the same result on any number of threads.
+std::vector<Placement> place(const Scene& scene, const ObjectPtr& query, const PlacementModel& model,
+                             const PlacementOptions& options);
+
+// The problems that the model is asked: candidate i looks at object i mod n and what is nearest to it, or at the whole
+// scene if that is no more than options.context objects.
+std::vector<PlacementProblem> placement_problems(const Scene& scene, const ObjectPtr& query,
+                                                 const PlacementOptions& options);
+
+// Settles each candidate pose with the whole scene, polishes, tries and ranks.
+std::vector<Placement> check_placements(const Scene& scene, const ObjectPtr& query, const std::vector<Pose>& candidates,
+                                        const PlacementOptions& options);
+
+}  // namespace dofusion

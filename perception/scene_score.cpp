@@ -1,0 +1,68 @@
+#include "perception/scene_score.h"
+
+#include <optional>
+
+namespace dofusion {
+
+std::vector<PlacedObject> without(std::vector<PlacedObject> objects, std::size_t i) {
+  objects.erase(objects.begin() + static_cast<std::ptrdiff_t>(i));
+  return objects;
+}
+
+double scene_score(const std::vector<ObjectModel>& models, const Cluster& cluster,
+                   const std::vector<PlacedObject>& objects, bool complete, const SceneCosts& costs) {
+  PoseScorer scorer(cluster.pyramid.fine);
+  Explanation scene = scorer.empty_scene();
+  double cost = 0.0;
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    scorer.add(models[objects[i].model].object->mesh, objects[i].T_world_object, scene);
+    const std::vector<PlacedObject> earlier(objects.begin(), objects.begin() + static_cast<std::ptrdiff_t>(i));
+    cost += penetration_cost(models, objects[i], earlier, costs.penetration) + costs.object;
+    if (complete) cost += floating_cost(models, objects[i], without(objects, i), costs.floating);
+    if (objects[i].freedom == Freedom::kResting) cost -= costs.resting_bonus;
+  }
+  return -cost - total_cost(scene);
+}
+
+SceneHypothesis refine_jointly(const std::vector<ObjectModel>& models, const Cluster& cluster,
+                               const SceneHypothesis& start, const SceneCosts& costs) {
+  SceneHypothesis scene = start;
+  scene.score = scene_score(models, cluster, scene.objects, true, costs);
+  PoseScorer scorer(cluster.pyramid.fine);
+  for (int round = 0; round < 2; ++round) {
+    for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+      const std::vector<PlacedObject> others = without(scene.objects, i);
+      Explanation rest_of_scene = scorer.empty_scene();
+      for (const PlacedObject& other : others) {
+        scorer.add(models[other.model].object->mesh, other.T_world_object, rest_of_scene);
+      }
+      const ObjectModel& model = models[scene.objects[i].model];
+      const auto try_from = [&](PlacedObject object) {
+        const PoseObjective objective = [&](const Pose& pose) {
+          PlacedObject at = object;
+          at.T_world_object = pose;
+          return scorer.gain(rest_of_scene, model.object->mesh, pose) -
+                 penetration_cost(models, at, others, costs.penetration) -
+                 floating_cost(models, at, others, costs.floating);
+        };
+        const Pose aligned = align_to_readings(scorer, rest_of_scene, model.object->mesh, object.T_world_object,
+                                               object.freedom, {2, 0.006, 0.006});
+        if (objective(aligned) > objective(object.T_world_object)) object.T_world_object = aligned;
+        object.T_world_object =
+            climb(objective, object.T_world_object, object.freedom, model.radius, {0.001, 0.00025, 2}).T_world_object;
+        SceneHypothesis changed = scene;
+        changed.objects[i] = object;
+        changed.score = scene_score(models, cluster, changed.objects, true, costs);
+        if (changed.score > scene.score) scene = changed;
+      };
+      try_from(scene.objects[i]);
+      if (scene.objects[i].freedom == Freedom::kResting) continue;
+      const std::optional<Pose> flat =
+          laid_flat(model, scene.objects[i].T_world_object, support_heights(models, others));
+      if (flat) try_from({scene.objects[i].model, *flat, Freedom::kResting});
+    }
+  }
+  return scene;
+}
+
+}  // namespace dofusion

@@ -1,0 +1,101 @@
+#include "perception/unexplained.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace dofusion {
+namespace {
+
+class PixelGroups {
+ public:
+  PixelGroups(const Cluster& cluster, const Explanation& scene) : cluster_(cluster), scene_(scene) {
+    const Observation& seen = cluster.pyramid.fine;
+    open_ = Image<std::uint8_t>(seen.depth.width, seen.depth.height, 0);
+    for (int v = 0; v < open_.height; ++v) {
+      for (int u = 0; u < open_.width; ++u) open_.at(v, u) = is_unexplained(v, u);
+    }
+  }
+
+  // Connected unexplained pixels with one label, as indices into the full image; the largest group.
+  std::vector<int> largest() {
+    std::vector<int> best;
+    int most = 0;
+    for (int v = 0; v < open_.height; ++v) {
+      for (int u = 0; u < open_.width; ++u) {
+        if (!open_.at(v, u)) continue;
+        int core = 0;
+        std::vector<int> group = flood(v, u, &core);
+        if (core <= most) continue;
+        most = core;
+        best = std::move(group);
+      }
+    }
+    core_of_largest_ = most;
+    return best;
+  }
+
+  // Its pixels that lie well inside: slivers along outlines have none.
+  int core_of_largest() const { return core_of_largest_; }
+
+ private:
+  bool is_unexplained(int v, int u) const {
+    const Observation& seen = cluster_.pyramid.fine;
+    const std::vector<std::uint8_t>& others = cluster_.other_labels;
+    const bool own = std::find(others.begin(), others.end(), seen.labels.at(v, u)) == others.end();
+    return own && seen.depth.at(v, u) > 0.0f && seen.depth.at(v, u) < scene_.depth.at(v, u) &&
+           scene_.cost.at(v, u) >= 0.99f * kNearerCost;
+  }
+
+  int open_neighbours(int v, int u) const {
+    int count = 0;
+    for (int dv = -1; dv <= 1; ++dv) {
+      for (int du = -1; du <= 1; ++du) {
+        if ((dv != 0 || du != 0) && open_.contains(v + dv, u + du) && open_.at(v + dv, u + du) != 0) ++count;
+      }
+    }
+    return count;
+  }
+
+  std::vector<int> flood(int v0, int u0, int* core) {
+    const LabelImage& labels = cluster_.pyramid.fine.labels;
+    std::vector<int> group;
+    std::vector<std::pair<int, int>> stack = {{v0, u0}};
+    std::vector<std::pair<int, int>> members;
+    open_.at(v0, u0) = 2;
+    while (!stack.empty()) {
+      const auto [v, u] = stack.back();
+      stack.pop_back();
+      members.emplace_back(v, u);
+      if (open_neighbours(v, u) >= 4) ++*core;
+      for (int dv = -2; dv <= 2; ++dv) {
+        for (int du = -2; du <= 2; ++du) {  // over gaps of one pixel: drop-outs
+          if (!open_.contains(v + dv, u + du) || open_.at(v + dv, u + du) != 1) continue;
+          if (labels.at(v + dv, u + du) != labels.at(v0, u0)) continue;
+          open_.at(v + dv, u + du) = 2;
+          stack.emplace_back(v + dv, u + du);
+        }
+      }
+    }
+    for (const auto& [v, u] : members) {
+      group.push_back((cluster_.window.v0 + v) * cluster_.depth->width + cluster_.window.u0 + u);
+      open_.at(v, u) = 0;
+    }
+    return group;
+  }
+
+  const Cluster& cluster_;
+  const Explanation& scene_;
+  Image<std::uint8_t> open_;
+  int core_of_largest_ = 0;
+};
+
+}  // namespace
+
+std::optional<Target> next_target(const Cluster& cluster, const Explanation& scene, int fewest_pixels) {
+  PixelGroups groups(cluster, scene);
+  const std::vector<int> pixels = groups.largest();
+  if (groups.core_of_largest() < fewest_pixels) return std::nullopt;
+  return make_target(pixels, *cluster.depth, cluster.camera, cluster.T_world_camera, *cluster.face_map);
+}
+
+}  // namespace dofusion

@@ -1,0 +1,27 @@
+// Pixels of a cluster that the scene so far does not account for.
+#pragma once
+
+#include <optional>
+
+#include "perception/candidate_search.h"
+
+namespace dofusion {
+
+// Everything about one cluster of objects that touch or hide each other.
+struct Cluster {
+  const DepthImage* depth = nullptr;
+  const LabelImage* labels = nullptr;
+  const FaceMap* face_map = nullptr;
+  Camera camera;
+  Pose T_world_camera = Pose::Identity();
+  PixelWindow window;                       // around its pixels, stride 1
+  std::vector<std::uint8_t> other_labels;   // labels of the segmentation that belong to other clusters
+  ObservationPyramid pyramid;
+};
+
+// The largest connected group of pixels with one label that read nearer than the scene, or nullopt if none has
+// `fewest_pixels` pixels well inside it (slivers along outlines have none). Unlabelled pixels count, too:
+// segmentation leaves out what is small.
+std::optional<Target> next_target(const Cluster& cluster, const Explanation& scene, int fewest_pixels);
+
+}  // namespace dofusion

@@ -1,0 +1,156 @@
+#include "diffusion/augmented_cloud.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "stability/shapes.h"
+
+namespace dofusion {
+namespace {
+
+// Coordinates of single precision at a few decimetres: an error of some 1e-7 m.
+constexpr double kTolerance = 5e-7;
+
+std::vector<float> cloud_of(const Scene& scene, int query, const CloudOptions& options, std::uint64_t seed = 0) {
+  std::vector<CloudShapePtr> shapes;
+  for (const ObjectPtr& object : scene.objects) shapes.push_back(std::make_shared<CloudShape>(*object));
+  std::vector<float> cloud(static_cast<std::size_t>(options.points) * 5);
+  Rng rng = make_rng(seed);
+  make_augmented_cloud(shapes, scene.T_world_object, query, options, rng, cloud.data());
+  return cloud;
+}
+
+Scene two_cubes(double gap) {
+  Scene scene;
+  scene.objects = {make_block("cube"), make_block("cube")};
+  scene.T_world_object = {make_pose(Eigen::Matrix3d::Identity(), {0, 0, 0.025}),
+                          make_pose(Eigen::Matrix3d::Identity(), {0, 0, 0.075 + gap})};
+  return scene;
+}
+
+TEST(AugmentedCloud, NormalisedLengthIsTheGeometricMean) {
+  EXPECT_NEAR(normalised_length({0.001}), 0.1, 1e-12);
+  EXPECT_NEAR(normalised_length({0.001, 0.000001}), std::cbrt(std::sqrt(1e-9)), 1e-12);
+  EXPECT_THROW(normalised_length({}), std::invalid_argument);
+  EXPECT_THROW(normalised_length({0.0}), std::invalid_argument);
+}
+
+TEST(AugmentedCloud, DistanceOfStackedCubesIsTheirGap) {
+  CloudOptions options;
+  options.points = 400;
+  options.length = 0.05;
+  options.distance_limit = 10.0;
+  const double gap = 0.01;
+  const std::vector<float> cloud = cloud_of(two_cubes(gap), 1, options);
+  double least = 1e9;
+  for (int i = 0; i < options.points; ++i) {
+    const float* p = &cloud[5 * i];
+    const double z = p[2] * options.length, distance = p[3] * options.length;
+    // Both cubes have the same x and y extent, so the distance of any point is that along z to the other's face.
+    const bool query = p[4] == 1.0f;
+    EXPECT_NEAR(distance, query ? z - 0.05 : 0.05 + gap - z, kTolerance);
+    EXPECT_EQ(query, i >= 200);
+    least = std::min(least, distance);
+  }
+  EXPECT_NEAR(least, gap, 1e-6);  // some points lie on the facing sides
+}
+
+TEST(AugmentedCloud, OverlapIsNegativeAndClamped) {
+  CloudOptions options;
+  options.points = 200;
+  options.length = 0.05;
+  options.distance_limit = 0.2;
+  const std::vector<float> cloud = cloud_of(two_cubes(-0.02), 1, options);
+  float low = 1, high = -1;
+  for (int i = 0; i < options.points; ++i) {
+    low = std::min(low, cloud[5 * i + 3]);
+    high = std::max(high, cloud[5 * i + 3]);
+  }
+  EXPECT_LT(low, 0.0f);
+  EXPECT_FLOAT_EQ(high, 0.2f);
+}
+
+TEST(AugmentedCloud, AloneTheDistanceIsTheLimitAndPointsLieOnTheSurface) {
+  Scene scene;
+  Rng rng = make_rng(4);
+  const ObjectPtr hat = make_block("hat");
+  const Pose pose = make_pose(random_rotation(rng), {0.3, -0.2, 0.1});
+  scene.objects = {hat};
+  scene.T_world_object = {pose};
+  CloudOptions options;
+  options.length = 0.04;
+  options.origin = {0.3, -0.2, 0.0};
+  const std::vector<float> cloud = cloud_of(scene, 0, options);
+  const MeshDistance distance(hat->mesh);
+  for (int i = 0; i < options.points; ++i) {
+    const Eigen::Vector3d p_world =
+        Eigen::Vector3d(cloud[5 * i], cloud[5 * i + 1], cloud[5 * i + 2]) * options.length + options.origin;
+    EXPECT_NEAR(distance(pose.inverse() * p_world), 0.0, kTolerance);
+    EXPECT_EQ(cloud[5 * i + 3], 1.0f);
+    EXPECT_EQ(cloud[5 * i + 4], 1.0f);
+  }
+}
+
+TEST(AugmentedCloud, RemainderGoesToTheQuery) {
+  Scene scene = two_cubes(0.0);
+  scene.objects.push_back(make_block("hat"));
+  scene.T_world_object.push_back(make_pose(Eigen::Matrix3d::Identity(), {0.2, 0, 0.1}));
+  CloudOptions options;
+  options.points = 100;
+  const std::vector<float> cloud = cloud_of(scene, 1, options);
+  int flagged = 0;
+  for (int i = 0; i < 100; ++i) flagged += cloud[5 * i + 4] == 1.0f;
+  EXPECT_EQ(flagged, 34);
+}
+
+TEST(AugmentedCloud, SeedRepeats) {
+  EXPECT_EQ(cloud_of(two_cubes(0.01), 0, {}, 7), cloud_of(two_cubes(0.01), 0, {}, 7));
+  EXPECT_NE(cloud_of(two_cubes(0.01), 0, {}, 7), cloud_of(two_cubes(0.01), 0, {}, 8));
+}
+
+// The vectorised distances of boxes and of convex meshes against the exact ones in double precision.
+TEST(CloudShape, DistanceAgreesWithTheExactOne) {
+  Rng rng = make_rng(5);
+  std::vector<ObjectPtr> objects = all_blocks();
+  objects.push_back(make_box("plank", {0.3, 0.05, 0.02}));
+  for (const ObjectPtr& object : objects) {
+    const MeshDistance exact(object->mesh);
+    const CloudShape shape(*object), as_mesh(object->mesh, std::nullopt);
+    const int count = 500;
+    std::vector<float> x(count), y(count), z(count), fast(count, 1e9f), mesh(count, 1e9f);
+    for (int i = 0; i < count; ++i) {
+      const Eigen::Vector3d p = normal3(rng, 0.5 * object->diameter);
+      x[i] = static_cast<float>(p.x());
+      y[i] = static_cast<float>(p.y());
+      z[i] = static_cast<float>(p.z());
+    }
+    shape.min_distance(count, x.data(), y.data(), z.data(), fast.data());
+    as_mesh.min_distance(count, x.data(), y.data(), z.data(), mesh.data());
+    for (int i = 0; i < count; ++i) {
+      const double wanted = exact(Eigen::Vector3d(x[i], y[i], z[i]));
+      EXPECT_NEAR(fast[i], wanted, kTolerance) << object->name;
+      EXPECT_NEAR(mesh[i], wanted, kTolerance) << object->name;
+    }
+  }
+}
+
+TEST(CloudShape, DrawsUniformlyOverTheSurface) {
+  const CloudShape plank(*make_box("plank", {0.2, 0.1, 0.02}));
+  const int count = 20000;
+  std::vector<float> x(count), y(count), z(count);
+  Rng rng = make_rng(6);
+  plank.sample(count, rng, x.data(), y.data(), z.data());
+  int on_large_faces = 0;
+  double sum_x = 0.0;
+  for (int i = 0; i < count; ++i) {
+    on_large_faces += std::abs(std::abs(z[i]) - 0.01f) < 1e-7f;
+    sum_x += x[i];
+  }
+  const double area = 2 * (0.2 * 0.1 + 0.2 * 0.02 + 0.1 * 0.02);
+  EXPECT_NEAR(on_large_faces / double(count), 2 * 0.2 * 0.1 / area, 0.015);  // five standard errors
+  EXPECT_NEAR(sum_x / count, 0.0, 0.0025);
+}
+
+}  // namespace
+}  // namespace dofusion

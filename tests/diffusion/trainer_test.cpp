@@ -1,0 +1,163 @@
+#include "diffusion/trainer.h"
+
+#include <cmath>
+#include <filesystem>
+
+#include <gmock/gmock.h>
+
+#include "diffusion/sampler.h"
+#include "diffusion/weights.h"
+#include "stability/files.h"
+#include "tests/diffusion/toy_scenes.h"
+
+namespace dofusion {
+namespace {
+
+using testing::HasSubstr;
+
+ModelConfig small_config() {
+  ModelConfig config;
+  config.points = 48;
+  config.neighbours = 8;
+  config.widths = {32, 64};
+  config.embedding = 128;
+  config.hidden = 128;
+  return config;
+}
+
+class TrainerTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::path(testing::TempDir()) / testing::UnitTest::GetInstance()->current_test_info()->name();
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+    options_.out = (folder_ / "model.safetensors").string();
+    options_.batch = 16;
+    options_.warm_up = 10;
+    options_.steps = 12;
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::filesystem::path folder_;
+  TrainOptions options_;
+};
+
+TEST_F(TrainerTest, ResumedTrainingFollowsTheSameCurve) {
+  const TrainingSet data({boxes_on_table(50, 1)}, small_config());
+  const TrainResult whole = train(data, small_config(), options_, "", {});
+  ASSERT_TRUE(whole.finished);
+  const std::vector<float> parameters = read_model(options_.out).parameters;
+
+  options_.out = (folder_ / "halves.safetensors").string();
+  int steps = 0;
+  const TrainResult first =
+      train(data, small_config(), options_, "", {}, [&](const TrainReport&) { return ++steps < 5; });
+  EXPECT_FALSE(first.finished);
+  options_.resume = true;
+  const TrainResult second = train(data, small_config(), options_, "", {});
+  EXPECT_TRUE(second.finished);
+  std::vector<float> losses = first.losses;
+  losses.insert(losses.end(), second.losses.begin(), second.losses.end());
+  EXPECT_EQ(losses, whole.losses);
+  EXPECT_EQ(read_model(options_.out).parameters, parameters);
+}
+
+TEST_F(TrainerTest, SeveralThreadsGiveTheSameLossesUpToRounding) {
+  const TrainingSet data({boxes_on_table(50, 1)}, small_config());
+  const TrainResult one = train(data, small_config(), options_, "", {});
+  options_.threads = 3;
+  options_.micro_batch = 4;
+  const TrainResult three = train(data, small_config(), options_, "", {});
+  // Sums in another order differ by some 1e-7, which Adam's first steps magnify where gradients are tiny.
+  for (std::size_t i = 0; i < one.losses.size(); ++i) EXPECT_NEAR(three.losses[i], one.losses[i], 0.02f) << i;
+}
+
+TEST_F(TrainerTest, CheckpointOfAnotherRunIsRefused) {
+  const TrainingSet data({boxes_on_table(50, 1)}, small_config());
+  train(data, small_config(), options_, "", {});
+  options_.resume = true;
+  options_.seed = 9;
+  try {
+    train(data, small_config(), options_, "", {});
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("another configuration, seed or batch size"));
+  }
+  ModelConfig other = small_config();
+  other.hidden = 64;
+  EXPECT_THROW(train(data, other, options_, "", {}), InputError);
+  std::filesystem::resize_file(options_.out + ".checkpoint", 1000);
+  EXPECT_THROW(train(data, small_config(), options_, "", {}), InputError);
+}
+
+TEST_F(TrainerTest, BadOutputAndBudgetAreRefused) {
+  const TrainingSet data({boxes_on_table(5, 1)}, small_config());
+  TrainOptions no_budget = options_;
+  no_budget.steps = 0;
+  EXPECT_THROW(train(data, small_config(), no_budget, "", {}), InputError);
+  options_.out = (folder_ / "missing" / "model.safetensors").string();
+  EXPECT_THROW(train(data, small_config(), options_, "", {}), InputError);
+}
+
+TEST_F(TrainerTest, DivergenceStopsAndKeepsTheLastGoodState) {
+  const TrainingSet data({boxes_on_table(50, 1)}, small_config());
+  options_.optimizer.learning_rate = 1e30;
+  options_.warm_up = 0;
+  options_.steps = 200;
+  try {
+    train(data, small_config(), options_, "", {});
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("not finite"));
+  }
+  EXPECT_NO_THROW(read_model(options_.out));
+}
+
+TEST_F(TrainerTest, BadDataIsRefused) {
+  EXPECT_THROW(TrainingSet({}, small_config()), InputError);
+  EXPECT_THROW(TrainingSet({boxes_on_table(3, 1)}, small_config(), "hat"), InputError);
+  EXPECT_THROW(TrainingSet({boxes_on_table(3, 1)}, small_config(), "box"), InputError);
+  SceneDataset broken = boxes_on_table(3, 1);
+  broken.scenes[1].objects[0].T_world_object.translation().x() = std::nan("");
+  EXPECT_THROW(TrainingSet({broken}, small_config()), InputError);
+}
+
+TEST_F(TrainerTest, HoldoutLeavesScenesOut) {
+  const TrainingSet data({boxes_on_table(7, 1), stacked_cubes(5, 1)}, small_config(), "box");
+  EXPECT_EQ(data.scenes(), 5u);
+}
+
+// A box that always lies on its largest face: the model must find the height and which way is up.
+TEST_F(TrainerTest, LearnsToLayABoxOnTheTable) {
+  const ModelConfig config = small_config();
+  const TrainingSet data({boxes_on_table(2000, 1)}, config);
+  options_.batch = 64;
+  options_.steps = 700;
+  options_.warm_up = 50;
+  options_.threads = 2;
+  options_.optimizer.learning_rate = 3e-3;
+  options_.optimizer.average = 0.99;
+  const TrainResult result = train(data, config, options_, "", {});
+  EXPECT_LT(result.last.loss, 0.75);
+
+  const PlacementModel model = PlacementModel::load(options_.out);
+  std::vector<PlacementProblem> problems(50);
+  const ObjectPtr box = make_box("box", {0.06, 0.10, 0.04});
+  for (std::size_t i = 0; i < problems.size(); ++i) {
+    problems[i].query = box;
+    problems[i].seed = i;
+  }
+  SamplerOptions options;
+  options.threads = 2;
+  const std::vector<Pose> poses = model.sample(problems, options);
+  int right = 0;
+  for (const Pose& pose : poses) {
+    const double height_error = std::abs(pose.translation().z() - 0.02);
+    const double tilt = std::acos(std::min(1.0, std::abs(pose.linear()(2, 2))));
+    right += height_error < 0.004 && tilt < 0.1;
+  }
+  EXPECT_GE(right, 45) << "of 50";  // a uniformly random orientation is right one time in 200
+}
+
+}  // namespace
+}  // namespace dofusion
