@@ -25,7 +25,11 @@ double normalised_length(const std::vector<double>& volumes) {
 
 CloudShape::CloudShape(const Object& object) {
   if (object.box_edges) half_edges_ = (*object.box_edges / 2).cast<float>();
-  if (!object.convex) exact_ = std::make_shared<MeshDistance>(object.mesh);
+  if (object.sdf) {
+    distance_ = [grid = object.sdf](const Eigen::Vector3d& p) { return (*grid)(p); };
+  } else if (!object.convex) {
+    distance_ = MeshDistance(object.mesh);
+  }
   prepare(object.mesh);
 }
 
@@ -92,9 +96,9 @@ void CloudShape::min_distance(int count, const float* x, const float* y, const f
     }
     return;
   }
-  if (exact_) {
+  if (distance_) {
     for (int i = 0; i < count; ++i)
-      out[i] = std::min(out[i], static_cast<float>((*exact_)(Eigen::Vector3d(x[i], y[i], z[i]))));
+      out[i] = std::min(out[i], static_cast<float>(distance_(Eigen::Vector3d(x[i], y[i], z[i]))));
     return;
   }
   // Convex: inside, the distance is the largest of the planes'; outside, the smallest of the triangles'. Point by

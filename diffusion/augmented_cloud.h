@@ -29,7 +29,7 @@ class CloudShape {
   // `count` points, uniform over the surface, own frame, metres: x, y, z apart, each (count).
   void sample(int count, Rng& rng, float* x, float* y, float* z) const;
 
-  // out[i] = min(out[i], signed distance of point i), metres. Exact; points (count) in this object's frame.
+  // out[i] = min(out[i], signed distance of point i), metres. Exact, or from the object's grid; points (count) in this object's frame.
   void min_distance(int count, const float* x, const float* y, const float* z, float* out) const;
 
  private:
@@ -43,7 +43,7 @@ class CloudShape {
   std::vector<Triangle> triangles_;
   std::vector<float> cumulative_area_;
   std::optional<Eigen::Vector3f> half_edges_;
-  std::shared_ptr<const MeshDistance> exact_;  // for solids that are not convex
+  DistanceFunction distance_;  // of an object's grid, or of a solid that is not convex; else empty
   double volume_ = 0.0;
 };
 

@@ -68,10 +68,9 @@ Camera read_camera(const std::string& path) {
 }
 
 void write_camera(const Camera& camera, const std::string& path) {
-  const nlohmann::ordered_json file = {{"cx", camera.cx},       {"cy", camera.cy},
-                                       {"depth_scale", camera.depth_scale},
-                                       {"fx", camera.fx},       {"fy", camera.fy},
-                                       {"height", camera.height}, {"width", camera.width}};
+  const nlohmann::ordered_json file = {{"cx", camera.cx},      {"cy", camera.cy}, {"depth_scale", camera.depth_scale},
+                                       {"fx", camera.fx},      {"fy", camera.fy}, {"height", camera.height},
+                                       {"width", camera.width}};
   write_file(path, file.dump(2) + "\n");
 }
 

@@ -40,8 +40,8 @@ bool visit_triangle(RTCPointQueryFunctionArguments* arguments) {
 }  // namespace
 
 struct MeshSdf::Impl {
-  Eigen::Vector3d centre;   // of the mesh; what follows is relative to it, where floats are finest
-  double half_size = 0.0;   // the largest coordinate
+  Eigen::Vector3d centre;  // of the mesh; what follows is relative to it, where floats are finest
+  double half_size = 0.0;  // the largest coordinate
   std::vector<SignedTriangle> triangles;
   EmbreeDevice device;
   EmbreeScene scene;
@@ -81,7 +81,21 @@ double MeshSdf::operator()(const Eigen::Vector3d& point) const {
 
 SdfGrid mesh_to_sdf_grid(const TriangleMesh& mesh, const SdfGridOptions& options) {
   const MeshSdf distance(mesh);
-  return make_sdf_grid(bounding_box(mesh), [&](const Eigen::Vector3d& point) { return distance(point); }, options);
+  return make_sdf_grid(
+      bounding_box(mesh), [&](const Eigen::Vector3d& point) { return distance(point); }, options);
+}
+
+ObjectPtr with_distance_field(const ObjectPtr& object, const SdfGridOptions& options) {
+  constexpr std::size_t kFewTriangles = 64;
+  if (object->box_edges || (object->convex && object->mesh.triangles.size() <= kFewTriangles)) return object;
+  auto copy = std::make_shared<Object>(*object);
+  copy->sdf = std::make_shared<SdfGrid>(mesh_to_sdf_grid(object->mesh, options));
+  return copy;
+}
+
+Scene with_distance_fields(Scene scene, const SdfGridOptions& options) {
+  for (ObjectPtr& object : scene.objects) object = with_distance_field(object, options);
+  return scene;
 }
 
 }  // namespace dofusion

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "stability/mesh.h"
+#include "stability/scene.h"
 #include "stability/sdf.h"
 
 namespace dofusion {
@@ -27,5 +28,10 @@ class MeshSdf {
 
 // The grid around a closed mesh, in the mesh's frame. Throws std::invalid_argument if the mesh is not closed.
 SdfGrid mesh_to_sdf_grid(const TriangleMesh& mesh, const SdfGridOptions& options = {});
+
+// The object with a distance field for many fast queries. Boxes and convex solids of few triangles come back as they
+// are: exact distances to them are as fast.
+ObjectPtr with_distance_field(const ObjectPtr& object, const SdfGridOptions& options = {});
+Scene with_distance_fields(Scene scene, const SdfGridOptions& options = {});
 
 }  // namespace dofusion

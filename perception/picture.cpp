@@ -23,7 +23,6 @@ constexpr std::array<Rgb, 10> kPalette{{{66, 120, 190},
                                         {120, 150, 60},
                                         {100, 110, 140},
                                         {225, 150, 190}}};
-constexpr Rgb kTableColour{205, 205, 202};
 constexpr Rgb kNoReading{0, 0, 0};
 constexpr Rgb kUnlabelled{90, 90, 95};
 
@@ -78,7 +77,7 @@ DepthImage smoothed(const DepthImage& depth) {
 
 // Shading in [0, 1] by a light at the camera of the surface seen at a pixel.
 double headlight(const DepthImage& depth, const Camera& camera, int row, int column) {
-  constexpr int kReach = 3;          // pixels
+  constexpr int kReach = 3;  // pixels
   constexpr double kUnknown = 0.8;
   // From one to the other side of the pixel, as far as they are on its surface.
   const auto difference = [&](int down, int right) -> Eigen::Vector3d {
@@ -155,6 +154,7 @@ Camera resized(const Camera& camera, double factor) {
 }
 
 std::string to_png(const ColourImage& image) {
+  if (image.pixels.empty()) throw std::invalid_argument("a picture without pixels");
   return encode_rgb_png(image.pixels.front().data(), image.width, image.height);
 }
 

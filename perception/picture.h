@@ -17,11 +17,12 @@ using ColourImage = Image<Rgb>;
 // A colour per object, distinct for the first ten; the highlighted query has one of its own.
 Rgb object_colour(int index);
 inline constexpr Rgb kQueryColour{240, 120, 20};
+inline constexpr Rgb kTableColour{205, 205, 202};
 
 struct PictureOptions {
-  int highlighted = -1;     // object drawn in the query's colour and outlined; -1 none
-  int shadow_samples = 16;  // rays a pixel towards the light, of 4 samples each; 0: no shadow
-  int ambient_samples = 16; // rays a pixel to the sky, as above; 0: no contact shading
+  int highlighted = -1;      // object drawn in the query's colour and outlined; -1 none
+  int shadow_samples = 16;   // rays a pixel towards the light, of 4 samples each; 0: no shadow
+  int ambient_samples = 16;  // rays a pixel to the sky, as above; 0: no contact shading
 };
 
 // The scanner's scene with matt surfaces, one lamp with soft shadows beside the viewer and light from the sky, four
@@ -40,7 +41,7 @@ ColourImage segmentation_picture(const LabelImage& labels, const DepthImage& dep
 // A picture with the same sight at another size, for instance half a sensor's for a report.
 Camera resized(const Camera& camera, double factor);
 
-std::string to_png(const ColourImage& image);  // the file's bytes
+std::string to_png(const ColourImage& image);  // the file's bytes; throws std::invalid_argument without pixels
 void write_picture(const ColourImage& image, const std::string& path);  // throws InputError naming the file
 
 }  // namespace dofusion

@@ -41,10 +41,14 @@ std::uint32_t checksum(const char* data, std::size_t size) {
 
 int channels_of(unsigned char colour_type) {
   switch (colour_type) {
-    case 2: return 3;
-    case 4: return 2;
-    case 6: return 4;
-    default: return 1;  // 0 grey, 3 palette
+    case 2:
+      return 3;
+    case 4:
+      return 2;
+    case 6:
+      return 4;
+    default:
+      return 1;  // 0 grey, 3 palette
   }
 }
 
@@ -68,8 +72,8 @@ PngHeader check_png(const std::string& bytes, const std::string& path) {
   PngHeader header;
   bool ended = false;
   for (std::size_t at = kSignatureSize; !ended;) {
-    const bool complete = at + kChunkOverhead <= bytes.size() &&
-                          big_endian(bytes, at) <= bytes.size() - at - kChunkOverhead;
+    const bool complete =
+        at + kChunkOverhead <= bytes.size() && big_endian(bytes, at) <= bytes.size() - at - kChunkOverhead;
     if (!complete)
       throw InputError(path + ": the PNG is truncated after " + std::to_string(bytes.size()) +
                        " bytes; copy or export it again");

@@ -39,7 +39,10 @@ std::vector<Eigen::Vector3d> triangle_normals(const TriangleMesh& mesh) {
 // parameter is the z-depth itself.
 struct PixelGrid {
   PixelGrid(const Camera& camera, const Pose& T_world_camera, int u0_, int v0_, int u1, int v1, int stride_)
-      : u0(u0_), v0(v0_), stride(stride_), columns((u1 - u0_ + stride_ - 1) / stride_),
+      : u0(u0_),
+        v0(v0_),
+        stride(stride_),
+        columns((u1 - u0_ + stride_ - 1) / stride_),
         rows((v1 - v0_ + stride_ - 1) / stride_) {
     const Eigen::Matrix3d R = T_world_camera.linear();
     origin = T_world_camera.translation().cast<float>();
@@ -88,11 +91,11 @@ void fill_packet(const PixelGrid& grid, int row0, int column0, RTCRayHit16& pack
 struct Scanner::Impl {
   EmbreeDevice device;
   std::vector<ObjectPtr> objects;
-  std::vector<EmbreeScene> object_scenes;               // per object
-  std::vector<EmbreeGeometry> instances;                // per object, geometry id i of the world
-  std::vector<std::vector<Eigen::Vector3d>> normals;    // per object and triangle, in the object's frame
-  std::vector<Eigen::Matrix3d> R_world_object;          // per object
-  EmbreeGeometry table;                                 // geometry id objects.size() of the world
+  std::vector<EmbreeScene> object_scenes;             // per object
+  std::vector<EmbreeGeometry> instances;              // per object, geometry id i of the world
+  std::vector<std::vector<Eigen::Vector3d>> normals;  // per object and triangle, in the object's frame
+  std::vector<Eigen::Matrix3d> R_world_object;        // per object
+  EmbreeGeometry table;                               // geometry id objects.size() of the world
   EmbreeScene world;
   bool changed = true;  // since the world was last committed
 
@@ -127,8 +130,9 @@ Scanner::Scanner(std::vector<ObjectPtr> objects, const ScannerOptions& options) 
   for (std::size_t i = 0; i < impl.objects.size(); ++i) {
     const TriangleMesh& mesh = impl.objects[i]->mesh;
     // Equal objects share one tree.
-    const auto same = std::find(impl.objects.begin(), impl.objects.begin() + static_cast<std::ptrdiff_t>(i),
-                                impl.objects[i]) - impl.objects.begin();
+    const auto same =
+        std::find(impl.objects.begin(), impl.objects.begin() + static_cast<std::ptrdiff_t>(i), impl.objects[i]) -
+        impl.objects.begin();
     if (static_cast<std::size_t>(same) < i) {
       rtcRetainScene(impl.object_scenes[same].get());
       impl.object_scenes.emplace_back(impl.object_scenes[same].get());
@@ -171,8 +175,10 @@ void Scanner::set_visible(int object, bool visible) {
   if (object < 0 || object >= static_cast<int>(impl_->objects.size()))
     throw std::invalid_argument("there is no object " + std::to_string(object));
   RTCGeometry instance = impl_->instances[object].get();
-  if (visible) rtcEnableGeometry(instance);
-  else rtcDisableGeometry(instance);
+  if (visible)
+    rtcEnableGeometry(instance);
+  else
+    rtcDisableGeometry(instance);
   impl_->changed = true;
 }
 
@@ -180,9 +186,9 @@ namespace {
 
 void check_camera(const Camera& camera) {
   if (camera.width <= 0 || camera.height <= 0 || !(camera.fx > 0.0) || !(camera.fy > 0.0))
-    throw std::invalid_argument("a camera needs a positive size and focal length, not " +
-                                std::to_string(camera.width) + "x" + std::to_string(camera.height) + ", fx " +
-                                std::to_string(camera.fx) + ", fy " + std::to_string(camera.fy));
+    throw std::invalid_argument("a camera needs a positive size and focal length, not " + std::to_string(camera.width) +
+                                "x" + std::to_string(camera.height) + ", fx " + std::to_string(camera.fx) + ", fy " +
+                                std::to_string(camera.fy));
 }
 
 }  // namespace
@@ -218,8 +224,7 @@ Scan Scanner::render(const Camera& camera, const Pose& T_world_camera) const {
   cast_grid(impl.world.get(), grid, [&](std::size_t pixel, float depth, unsigned instance, unsigned triangle) {
     const int object = impl.object_of(instance);
     scan.depth.pixels[pixel] = depth;
-    scan.labels.pixels[pixel] =
-        object < 0 ? kLabelTable : static_cast<std::uint8_t>(kLabelFirstObject + object);
+    scan.labels.pixels[pixel] = object < 0 ? kLabelTable : static_cast<std::uint8_t>(kLabelFirstObject + object);
     scan.normals.pixels[pixel] = (R_camera_world * impl.normal_world(object, triangle)).cast<float>();
   });
   return scan;
@@ -239,8 +244,7 @@ Scan Scanner::render_window(const Camera& camera, const Pose& T_world_camera, in
   cast_grid(impl.world.get(), grid, [&](std::size_t pixel, float depth, unsigned instance, unsigned) {
     const int object = impl.object_of(instance);
     scan.depth.pixels[pixel] = depth;
-    scan.labels.pixels[pixel] =
-        object < 0 ? kLabelTable : static_cast<std::uint8_t>(kLabelFirstObject + object);
+    scan.labels.pixels[pixel] = object < 0 ? kLabelTable : static_cast<std::uint8_t>(kLabelFirstObject + object);
   });
   return scan;
 }

@@ -12,14 +12,14 @@
 namespace dofusion {
 
 struct Scan {
-  DepthImage depth;    // z-depth, metres, exact; 0 where nothing is hit
-  LabelImage labels;   // 0 nothing, 1 table, 2 + i object i of the scanner
-  NormalImage normals; // outward unit normals in the camera's frame; zero where nothing is hit
+  DepthImage depth;     // z-depth, metres, exact; 0 where nothing is hit
+  LabelImage labels;    // 0 nothing, 1 table, 2 + i object i of the scanner
+  NormalImage normals;  // outward unit normals in the camera's frame; zero where nothing is hit
 };
 
 struct ScannerOptions {
-  bool table = true;            // the plane z = 0 is there
-  double table_half_size = 2.0; // metres; the table ends there
+  bool table = true;             // the plane z = 0 is there
+  double table_half_size = 2.0;  // metres; the table ends there
 };
 
 // One Embree scene with an instance per object, whose poses change without rebuilding the objects' trees. `render`
@@ -45,8 +45,8 @@ class Scanner {
                      int stride = 1) const;
 
   struct Hit {
-    double distance = 0.0;  // along the unit direction, metres
-    int object = -1;        // -1 the table
+    double distance = 0.0;                             // along the unit direction, metres
+    int object = -1;                                   // -1 the table
     Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // world frame, unit, outward
   };
   std::optional<Hit> cast_ray(const Eigen::Vector3d& origin_world, const Eigen::Vector3d& direction_world) const;

@@ -18,7 +18,7 @@ std::vector<Candidate> candidates_for(const std::vector<ObjectModel>& models, co
                                       const SceneSearchOptions& options) {
   CandidateOptions candidate_options;
   candidate_options.threads = options.threads;
-  candidate_options.costs.penetration = options.costs.penetration;
+  candidate_options.penetration = options.costs.penetration;
   return find_candidates(models, cluster.pyramid, scene, target, cluster.camera, cluster.T_world_camera,
                          candidate_options);
 }

@@ -92,7 +92,8 @@ SensorTerms sensor_terms(SensorModel sensor) {
   terms.grazing_limit_deg = 8.0;
   terms.edge_fly = 0.1;
   switch (sensor) {
-    case SensorModel::kNone: break;
+    case SensorModel::kNone:
+      break;
     case SensorModel::kKinect:
       terms.axial_sigma = kinect_axial_sigma;
       terms.lateral_sigma_px = kinect_lateral_sigma_px;
@@ -152,9 +153,9 @@ double kinect2_axial_sigma(double depth, double incidence) {
 }
 
 double realsense_sigma(double depth, double) {
-  constexpr double kFocalPx = 0.5 * 848;   // 848 columns over 90 degrees
-  constexpr double kBaseline = 0.050;      // metres
-  constexpr double kSubpixel = 0.08;       // RMS of the disparity, pixels
+  constexpr double kFocalPx = 0.5 * 848;  // 848 columns over 90 degrees
+  constexpr double kBaseline = 0.050;     // metres
+  constexpr double kSubpixel = 0.08;      // RMS of the disparity, pixels
   return depth * depth * kSubpixel / (kFocalPx * kBaseline);
 }
 

@@ -25,11 +25,11 @@ DepthImage apply_sensor_noise(const Scan& scan, const Camera& camera, SensorMode
 struct SensorTerms {
   double (*axial_sigma)(double depth, double incidence) = nullptr;  // metres, from metres and radians
   double (*lateral_sigma_px)(double incidence) = nullptr;           // of each image coordinate
-  double disparity_step_px = 0.0;     // quantisation, of a 0.075 m baseline and 585.5 px focal length; 0: none
-  double grazing_limit_deg = 0.0;     // no reading where the ray meets the surface at less than this (Handa: 8)
-  double incidence_drop = 0.0;        // times 1 - cos(incidence): probability of no reading; see sensor_terms
-  double edge_drop = 0.0;             // probability of no reading at a pixel beside a depth step
-  double edge_fly = 0.0;              // probability of a flying pixel there
+  double disparity_step_px = 0.0;  // quantisation, of a 0.075 m baseline and 585.5 px focal length; 0: none
+  double grazing_limit_deg = 0.0;  // no reading where the ray meets the surface at less than this (Handa: 8)
+  double incidence_drop = 0.0;     // times 1 - cos(incidence): probability of no reading; see sensor_terms
+  double edge_drop = 0.0;          // probability of no reading at a pixel beside a depth step
+  double edge_fly = 0.0;           // probability of a flying pixel there
 };
 
 // No sensor here uses incidence_drop: at 1 it would take half of a table seen at 60 degrees, whereas 45 frames of a

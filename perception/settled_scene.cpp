@@ -9,6 +9,7 @@ namespace dofusion {
 namespace {
 
 constexpr double kFallsOver = 150.0;   // nats: handicap of a scene that does not stand
+constexpr double kTimeLimit = 1.0;     // simulated seconds; what has hardly moved by then stands
 constexpr double kWorsePerPixel = 0.1; // nats that settling may cost for each pixel an object shows
 
 int visible_pixels(const std::vector<ObjectModel>& models, const Cluster& cluster,
@@ -35,8 +36,10 @@ Settled settle(const std::vector<ObjectModel>& models, const Cluster& cluster, c
     objects.push_back(models[object.model].object);
     poses.push_back(object.T_world_object);
   }
-  const SettleResult result = Simulator(objects).settle(poses);
-  Settled settled{scene, result.status == SettleStatus::kSettled};
+  PhysicsOptions physics;
+  physics.time_limit = kTimeLimit;
+  const SettleResult result = Simulator(objects, physics).settle(poses);
+  Settled settled{scene, result.status != SettleStatus::kDiverged};
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const Pose moved_by = poses[i].inverse() * result.T_world_object[i];
     if (moved_by.translation().norm() > limits.distance || rotation_angle(moved_by.linear()) > limits.angle) {

@@ -13,8 +13,8 @@ namespace {
 
 using Linear = Eigen::Vector3f;  // light, proportional to power
 
-constexpr int kSide = 2;                    // samples a pixel's side
-constexpr float kSurfaceOffset = 1e-4f;     // metres; where shadow rays begin, above what floats resolve
+constexpr int kSide = 2;                             // samples a pixel's side
+constexpr float kSurfaceOffset = 1e-4f;              // metres; where shadow rays begin, above what floats resolve
 constexpr float kFadeBegin = 0.5f, kFadeEnd = 1.6f;  // metres from the sight's centre; the table fades to the backdrop
 
 float linear_of(std::uint8_t value) { return std::pow(static_cast<float>(value) / 255.0f, 2.2f); }
@@ -63,13 +63,17 @@ struct Surface {
 class Shader {
  public:
   Shader(const Scanner& scanner, const Camera& camera, const Pose& T_world_camera, const PictureOptions& options)
-      : scanner_(scanner), options_(options), fine_(resized(camera, kSide)), T_world_camera_(T_world_camera),
-        R_world_camera_(T_world_camera.linear().cast<float>()), lamp_(lamp_for(T_world_camera)),
-        lamp_points_(disk_points(options.shadow_samples)), sky_points_(disk_points(options.ambient_samples)),
+      : scanner_(scanner),
+        options_(options),
+        fine_(resized(camera, kSide)),
+        T_world_camera_(T_world_camera),
+        R_world_camera_(T_world_camera.linear().cast<float>()),
+        lamp_(lamp_for(T_world_camera)),
+        lamp_points_(disk_points(options.shadow_samples)),
+        sky_points_(disk_points(options.ambient_samples)),
         scan_(scanner.render(fine_, T_world_camera)) {
     // The backdrop is as bright as the table in full light, so that the table fades without a seam.
-    backdrop_ = lit(linear_of(Rgb{205, 205, 202}), Eigen::Vector3f::UnitZ(), 1.0f, 1.0f,
-                    -R_world_camera_.col(2));
+    backdrop_ = lit(linear_of(kTableColour), Eigen::Vector3f::UnitZ(), 1.0f, 1.0f, -R_world_camera_.col(2));
     const Eigen::Vector3d eye = T_world_camera.translation(), forward = T_world_camera.linear().col(2);
     const double along = forward.z() < -0.1 ? -eye.z() / forward.z() : 1.0;
     centre_ = (eye + along * forward).cast<float>();
@@ -161,10 +165,9 @@ class Shader {
     const std::uint8_t label = scan_.labels.at(row, column);
     if (label == kLabelNothing) return backdrop_;
     const Surface& surface = surfaces_[static_cast<std::size_t>(column)];
-    const Eigen::Vector3f to_viewer =
-        (T_world_camera_.translation().cast<float>() - surface.point).normalized();
+    const Eigen::Vector3f to_viewer = (T_world_camera_.translation().cast<float>() - surface.point).normalized();
     if (label == kLabelTable) {
-      const Linear table = lit(linear_of(Rgb{205, 205, 202}), surface.normal, lamp, sky, to_viewer);
+      const Linear table = lit(linear_of(kTableColour), surface.normal, lamp, sky, to_viewer);
       const float distance = (surface.point - centre_).head<2>().norm();
       const float fade = std::clamp((distance - kFadeBegin) / (kFadeEnd - kFadeBegin), 0.0f, 1.0f);
       return (1.0f - fade) * table + fade * backdrop_;
@@ -196,9 +199,9 @@ class Shader {
   Scan scan_;
   Linear backdrop_ = Linear::Zero();
   Eigen::Vector3f centre_ = Eigen::Vector3f::Zero();
-  std::vector<Surface> surfaces_;             // of the row being shaded
-  std::vector<Scanner::Segment> segments_;    // scratch
-  std::vector<std::size_t> owners_;           // scratch
+  std::vector<Surface> surfaces_;           // of the row being shaded
+  std::vector<Scanner::Segment> segments_;  // scratch
+  std::vector<std::size_t> owners_;         // scratch
 };
 
 }  // namespace

@@ -92,7 +92,6 @@ class ShapeFitter {
         tolerance_(3.0 * quantile(view.sigma, 0.5) + options.slack) {}
 
   std::optional<FittedShape> fit() {
-    if (getenv("DBG")) for (auto& f : view_.faces) fprintf(stderr, "   L%d face px %d n %.3f %.3f %.3f off %.3f c %.3f %.3f %.3f lowest %.3f\n", view_.label, f.pixels, f.plane.normal.x(), f.plane.normal.y(), f.plane.normal.z(), f.plane.offset, f.centre.x(), f.centre.y(), f.centre.z(), view_.lowest);
     if (view_.points.size() < 4) return std::nullopt;
     propose_upright();
     propose_lying();
@@ -117,7 +116,6 @@ class ShapeFitter {
     if (mesh) mesh = cut(*mesh, {-kUp, -support_});
     if (!mesh || bounding_box(*mesh).min.z() > support_ + kFloats) return;
     const double score = score_shape(*mesh, view_, evidence_, options_.slack);
-    if (getenv("DBG")) fprintf(stderr, "   L%d %s score %.3f yaw %.1f z %.0f..%.0f\n", view_.label, to_string(kind).c_str(), score, std::atan2(R(1,0),R(0,0))*57.3, bounding_box(*mesh).min.z()*1e3, bounding_box(*mesh).max.z()*1e3);
     if (best_ && score + preference(kind) <= best_->score + preference(best_->kind)) return;
     best_ = FittedShape{std::move(*mesh), R, kind, score};
   }

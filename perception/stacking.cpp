@@ -1,7 +1,6 @@
 #include "perception/stacking.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <numeric>
 
 #include "perception/shape_score.h"
@@ -122,6 +121,13 @@ bool overlaps_others(std::size_t body, const std::vector<Body>& bodies, double t
   return false;
 }
 
+// Deeper than neighbours that touch may seem to overlap.
+bool cuts_into(const TriangleMesh& mesh, const std::vector<Body>& bodies) {
+  constexpr double kDeep = 0.008;  // metres
+  return std::any_of(bodies.begin(), bodies.end(),
+                     [&](const Body& body) { return find_overlap(mesh, body.shape.mesh).depth > kDeep; });
+}
+
 // The shortest lengthening of `lower`, to any side, that carries `upper`; false if there is none.
 bool lengthen(std::size_t lower, std::size_t upper, std::vector<Body>& bodies, const ShapeEvidence& evidence,
               const UnknownRecoveryOptions& options) {
@@ -138,7 +144,6 @@ bool lengthen(std::size_t lower, std::size_t upper, std::vector<Body>& bodies, c
       const std::optional<TriangleMesh> longer = solid_hull(points);
       if (!longer) continue;
       bodies[lower].shape.mesh = *longer;
-      if (is_carried(upper, bodies, options.balance)) fprintf(stderr, "  len %.3f axis %.2f %.2f: overlap %d score %.3f seen %.3f\n", length, axis.x(), axis.y(), overlaps_others(lower, bodies, options.overlap), score_shape(*longer, bodies[lower].view, evidence, options.shape.slack), seen_score);
       if (is_carried(upper, bodies, options.balance) && !overlaps_others(lower, bodies, options.overlap) &&
           score_shape(*longer, bodies[lower].view, evidence, options.shape.slack) > seen_score - kContradiction) {
         return true;
@@ -158,7 +163,8 @@ bool is_high_enough(const TriangleMesh& mesh, double min_size) {
 
 std::optional<FittedShape> fit_on_support(const ObjectView& view, const std::vector<Body>& bodies,
                                           const ShapeEvidence& evidence, const UnknownRecoveryOptions& options) {
-  constexpr double kTips = 0.15;
+  constexpr double kTips = 0.15;    // of the score
+  constexpr double kCutsIn = 0.25;
   std::optional<FittedShape> best;
   double best_score = 0.0;
   const std::vector<Support> supports = find_supports(view, bodies, options);
@@ -166,7 +172,7 @@ std::optional<FittedShape> fit_on_support(const ObjectView& view, const std::vec
     std::optional<FittedShape> shape = fit_shape(view, support.height, evidence, options.shape);
     if (!shape || !is_high_enough(shape->mesh, options.min_size)) continue;
     const bool balanced = is_balanced(*shape, supports, support);
-    const double score = shape->score - (balanced ? 0.0 : kTips);
+    const double score = shape->score - (balanced ? 0.0 : kTips) - (cuts_into(shape->mesh, bodies) ? kCutsIn : 0.0);
     if (!best || score > best_score) best = shape, best_score = score;
     if (balanced && support.body != nullptr) break;
   }
@@ -181,11 +187,10 @@ void extend_hidden_supports(std::vector<Body>& bodies, const ShapeEvidence& evid
     return bounding_box(bodies[a].shape.mesh).min.z() > bounding_box(bodies[b].shape.mesh).min.z();
   });
   for (const std::size_t upper : from_top) {
-    for (std::size_t lower = 0; lower < bodies.size(); ++lower) if (lower!=upper) fprintf(stderr,"  U%d on L%d: rests %d common %zu carried %d gap %.4f\n", bodies[upper].view.label, bodies[lower].view.label, rests_on(bodies[upper].shape.mesh, bodies[lower].shape.mesh), common_footprint(bodies[upper].shape.mesh, bodies[lower].shape.mesh).size(), is_carried(upper,bodies,options.balance), bounding_box(bodies[upper].shape.mesh).min.z() - bounding_box(bodies[lower].shape.mesh).max.z());
     for (std::size_t lower = 0; lower < bodies.size(); ++lower) {
       if (lower == upper || !rests_on(bodies[upper].shape.mesh, bodies[lower].shape.mesh)) continue;
       if (is_carried(upper, bodies, options.balance)) break;
-      bool ok = lengthen(lower, upper, bodies, evidence, options); fprintf(stderr, "upper L%d lower L%d lengthen %d\n", bodies[upper].view.label, bodies[lower].view.label, ok);
+      lengthen(lower, upper, bodies, evidence, options);
     }
   }
 }

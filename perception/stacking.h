@@ -14,7 +14,7 @@ struct Body {
 };
 
 // The shape of an object on the table or on one of the bodies below it, whichever explains the readings best; one that
-// would tip over counts less. nullopt if no shape is as high as options.min_size.
+// would tip over or reach into a body counts less. nullopt if no shape is as high as options.min_size.
 std::optional<FittedShape> fit_on_support(const ObjectView& view, const std::vector<Body>& bodies,
                                           const ShapeEvidence& evidence, const UnknownRecoveryOptions& options);
 

@@ -17,8 +17,8 @@ Pose sample_viewpoint(const Eigen::Vector3d& target, const ViewpointOptions& opt
       !(options.min_elevation_deg <= options.max_elevation_deg) || !(options.max_elevation_deg < 90.0))
     throw std::invalid_argument("a viewpoint needs a positive distance and 0 <= min_elevation <= max_elevation < 90");
   // The area of a zone of the sphere is proportional to its height.
-  const double height = uniform(rng, std::sin(options.min_elevation_deg * kDegree),
-                                std::sin(options.max_elevation_deg * kDegree));
+  const double height =
+      uniform(rng, std::sin(options.min_elevation_deg * kDegree), std::sin(options.max_elevation_deg * kDegree));
   const double azimuth = uniform(rng, -kPi, kPi);
   const double radius = std::sqrt(1.0 - height * height);
   const Eigen::Vector3d direction(radius * std::cos(azimuth), radius * std::sin(azimuth), height);

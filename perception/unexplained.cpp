@@ -56,6 +56,11 @@ class PixelGroups {
     return count;
   }
 
+  // Segmentation may have left out a part of an object, but parts with two labels are taken one at a time.
+  static bool may_join(std::uint8_t a, std::uint8_t b) {
+    return a == b || a < kLabelFirstObject || b < kLabelFirstObject;
+  }
+
   std::vector<int> flood(int v0, int u0, int* core) {
     const LabelImage& labels = cluster_.pyramid.fine.labels;
     std::vector<int> group;
@@ -70,7 +75,7 @@ class PixelGroups {
       for (int dv = -2; dv <= 2; ++dv) {
         for (int du = -2; du <= 2; ++du) {  // over gaps of one pixel: drop-outs
           if (!open_.contains(v + dv, u + du) || open_.at(v + dv, u + du) != 1) continue;
-          if (labels.at(v + dv, u + du) != labels.at(v0, u0)) continue;
+          if (!may_join(labels.at(v, u), labels.at(v + dv, u + du))) continue;
           open_.at(v + dv, u + du) = 2;
           stack.emplace_back(v + dv, u + du);
         }

@@ -19,9 +19,9 @@ struct Cluster {
   ObservationPyramid pyramid;
 };
 
-// The largest connected group of pixels with one label that read nearer than the scene, or nullopt if none has
-// `fewest_pixels` pixels well inside it (slivers along outlines have none). Unlabelled pixels count, too:
-// segmentation leaves out what is small.
+// The largest connected group of pixels of one label that read nearer than the scene, or nullopt if none has
+// `fewest_pixels` pixels well inside it (slivers along outlines have none). Pixels without an object's
+// label join any: segmentation leaves out what is small.
 std::optional<Target> next_target(const Cluster& cluster, const Explanation& scene, int fewest_pixels);
 
 }  // namespace dofusion

@@ -17,7 +17,7 @@ struct UnknownRecoveryOptions {
   double min_size = 0.004;        // metres; an object is at least this high
   double contact = 0.01;          // metres, with three sigmas: how deep an object's visible foot may lie below the top
                                   // of what it stands on
-  double rests_on = 0.15;         // share of an object's readings that must lie above what it stands on
+  double rests_on = 0.08;         // share of an object's readings that must lie above what it stands on
   double balance = 0.004;         // metres; a centre of mass lies at least this far inside what carries it
   double max_extension = 0.3;     // metres that a carrying object may be larger than seen, where that is hidden
   double overlap = 5e-4;          // metres; neighbours that overlap deeper are cut apart

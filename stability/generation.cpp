@@ -99,7 +99,7 @@ struct SceneGenerator::Impl {
   SimulatorCache simulators;
   GenerationStatistics statistics;
 
-  explicit Impl(const GenerationOptions& o) : options(o), simulators(o.physics, 512) {
+  explicit Impl(const GenerationOptions& o) : options(o), simulators(o.physics, o.shapes == ShapeFamily::kBlocks ? 512 : 8) {
     for (const std::string& name : block_names()) {
       blocks.push_back(make_block(name));
       shapes.push_back({name, blocks.back()->mesh, blocks.back()});

@@ -11,6 +11,8 @@
 
 namespace dofusion {
 
+struct SdfGrid;  // stability/sdf.h
+
 // A rigid, uniform solid. Its frame has the origin at the centre of mass.
 struct Object {
   std::string name;
@@ -19,6 +21,7 @@ struct Object {
   double volume = 0.0;                         // cubic metres
   double diameter = 0.0;                       // metres; what displacements are divided by
   bool convex = true;
+  std::shared_ptr<const SdfGrid> sdf;          // signed distances, own frame, where a grid was made; else null
 };
 
 using ObjectPtr = std::shared_ptr<const Object>;

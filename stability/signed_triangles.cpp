@@ -85,13 +85,20 @@ TriangleDistance distance_to_triangle(const SignedTriangle& t, const Eigen::Vect
     return TriangleDistance{offset.squaredNorm(), offset.dot(normal)};
   };
   switch (closest.feature) {
-    case Feature::kVertexA: return towards(t.vertex_normals[0]);
-    case Feature::kVertexB: return towards(t.vertex_normals[1]);
-    case Feature::kVertexC: return towards(t.vertex_normals[2]);
-    case Feature::kEdgeAB: return towards(t.edge_normals[0]);
-    case Feature::kEdgeBC: return towards(t.edge_normals[1]);
-    case Feature::kEdgeCA: return towards(t.edge_normals[2]);
-    case Feature::kFace: break;
+    case Feature::kVertexA:
+      return towards(t.vertex_normals[0]);
+    case Feature::kVertexB:
+      return towards(t.vertex_normals[1]);
+    case Feature::kVertexC:
+      return towards(t.vertex_normals[2]);
+    case Feature::kEdgeAB:
+      return towards(t.edge_normals[0]);
+    case Feature::kEdgeBC:
+      return towards(t.edge_normals[1]);
+    case Feature::kEdgeCA:
+      return towards(t.edge_normals[2]);
+    case Feature::kFace:
+      break;
   }
   return towards(t.normal);
 }

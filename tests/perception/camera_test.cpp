@@ -39,7 +39,7 @@ TEST(Camera, LookAtRefusesViewsWithoutAnUp) {
 
 TEST(Camera, FileRoundTripKeepsEveryField) {
   const TemporaryDirectory directory;
-  const std::string path = directory.file("camera.json");
+  const std::string path = directory / "camera.json";
   write_camera(kCamera, path);
   const Camera read = read_camera(path);
   EXPECT_EQ(read.fx, kCamera.fx);
@@ -61,7 +61,7 @@ class BadCameraFile : public testing::TestWithParam<BadCamera> {};
 
 TEST_P(BadCameraFile, IsRefusedWithTheFileAndTheField) {
   const TemporaryDirectory directory;
-  const std::string path = directory.file("camera.json");
+  const std::string path = directory / "camera.json";
   write_file(path, GetParam().text);
   try {
     read_camera(path);

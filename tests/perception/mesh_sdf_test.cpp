@@ -1,8 +1,8 @@
 #include "perception/mesh_sdf.h"
 
-#include <gtest/gtest.h>
-
 #include <cmath>
+
+#include <gtest/gtest.h>
 
 #include "stability/random.h"
 #include "stability/shapes.h"

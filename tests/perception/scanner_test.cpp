@@ -1,9 +1,9 @@
 #include "perception/scanner.h"
 
+#include <algorithm>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-
-#include <algorithm>
 
 #include "stability/shapes.h"
 
@@ -81,8 +81,7 @@ TEST(Scanner, NormalsFollowTheObjectsRotation) {
     if (scan.labels.pixels[i] != kLabelFirstObject) continue;
     ++seen;
     // In the box's frame a face's normal is a signed axis.
-    const Eigen::Vector3d normal =
-        R.transpose() * (T_world_camera.linear() * scan.normals.pixels[i].cast<double>());
+    const Eigen::Vector3d normal = R.transpose() * (T_world_camera.linear() * scan.normals.pixels[i].cast<double>());
     EXPECT_NEAR(normal.cwiseAbs().maxCoeff(), 1.0, 1e-6);
     EXPECT_NEAR(normal.norm(), 1.0, 1e-6);
     const int u = static_cast<int>(i) % kCamera.width, v = static_cast<int>(i) / kCamera.width;

@@ -1,9 +1,9 @@
 #include "perception/sensor_noise.h"
 
+#include <cmath>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-
-#include <cmath>
 
 namespace dofusion {
 namespace {

@@ -1,9 +1,9 @@
 #include "perception/synthetic_view.h"
 
-#include <gtest/gtest.h>
-
 #include <algorithm>
 #include <cmath>
+
+#include <gtest/gtest.h>
 
 namespace dofusion {
 namespace {

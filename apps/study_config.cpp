@@ -1,0 +1,160 @@
+#include "apps/study_config.h"
+
+#include <filesystem>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "stability/files.h"
+
+namespace dofusion {
+namespace {
+
+using nlohmann::json;
+
+// Takes the fields of an object one by one; what is left in the end is unknown.
+class Fields {
+ public:
+  // `prefix` stands before field names in messages: "" or "tasks[1].".
+  Fields(json object, std::string source, std::string prefix)
+      : object_(std::move(object)), source_(std::move(source)), prefix_(std::move(prefix)) {}
+
+  // Sets `value` if the field is there; `wanted` describes the type, `valid` the range.
+  template <class T>
+  void take(const char* name, T& value, const std::string& wanted,
+            const std::function<bool(const T&)>& valid = [](const T&) { return true; }) {
+    const auto field = object_.find(name);
+    if (field == object_.end()) return;
+    if (!is_a<T>(*field)) fail(name, wanted, *field);
+    value = field->get<T>();
+    if (!valid(value)) fail(name, wanted, *field);
+    object_.erase(field);
+  }
+
+  // As take, for a field that names one of several things; `parse` throws std::invalid_argument on others.
+  template <class T>
+  void take_name(const char* name, T& value, T (*parse)(const std::string&)) {
+    std::string text;
+    take<std::string>(name, text, "a string");
+    if (text.empty()) return;
+    try {
+      value = parse(text);
+    } catch (const std::invalid_argument& error) {
+      throw InputError(source_ + ": '" + prefix_ + name + "': " + error.what());
+    }
+  }
+
+  void finish() const {
+    if (!object_.empty()) throw InputError(source_ + ": unknown field '" + prefix_ + object_.begin().key() + "'");
+  }
+
+  [[noreturn]] void fail(const std::string& name, const std::string& wanted, const json& got) const {
+    throw InputError(source_ + ": '" + prefix_ + name + "' must be " + wanted + ", not " + got.dump());
+  }
+
+ private:
+  template <class T>
+  static bool is_a(const json& field) {
+    if constexpr (std::is_same_v<T, bool>) return field.is_boolean();
+    if constexpr (std::is_same_v<T, int>) return field.is_number_integer();
+    if constexpr (std::is_same_v<T, double>) return field.is_number();
+    if constexpr (std::is_same_v<T, std::string>) return field.is_string() && !field.get_ref<const std::string&>().empty();
+    if constexpr (std::is_same_v<T, json>) return true;
+    if constexpr (std::is_same_v<T, std::vector<double>>) {
+      if (!field.is_array()) return false;
+      for (const json& entry : field)
+        if (!entry.is_number()) return false;
+      return true;
+    }
+  }
+
+  json object_;
+  std::string source_, prefix_;
+};
+
+bool are_noise_scales(const std::vector<double>& scales) {
+  if (scales.empty()) return false;
+  for (std::size_t i = 0; i < scales.size(); ++i) {
+    if (!(scales[i] >= 0.0 && scales[i] <= 100.0)) return false;
+    if (i > 0 && scales[i] <= scales[i - 1]) return false;
+  }
+  return true;
+}
+
+StudyTask task_from_json(const json& entry, const std::string& source, const std::string& name) {
+  if (!entry.is_object()) throw InputError(source + ": '" + name + "' must be an object with task and objects");
+  StudyTask task;
+  bool has_objects = entry.contains("objects");
+  if (!entry.contains("task")) throw InputError(source + ": '" + name + ".task' is missing");
+  Fields fields(entry, source, name + ".");
+  fields.take_name<Task>("task", task.task, task_from_string);
+  task.objects = task.task == Task::kSingle ? 1 : 2;
+  const bool single = task.task == Task::kSingle;
+  fields.take<int>("objects", task.objects, single ? "1 for single" : "2 to 6 for stack and unstructured",
+                   [&](const int& n) { return single ? n == 1 : n >= 2 && n <= 6; });
+  if (!has_objects && !single) throw InputError(source + ": '" + name + ".objects' is missing");
+  fields.finish();
+  return task;
+}
+
+}  // namespace
+
+StudyConfig study_config_from_json(const std::string& text, const std::string& source) {
+  json object;
+  try {
+    object = json::parse(text);
+  } catch (const json::exception& error) {
+    throw InputError(source + ": is not valid JSON (" + error.what() + ")");
+  }
+  if (!object.is_object()) throw InputError(source + ": must hold a JSON object of the study's settings");
+
+  StudyConfig config;
+  Fields fields(object, source, "");
+  fields.take_name<SensorModel>("sensor", config.sensor, sensor_from_string);
+  fields.take<std::vector<double>>("noise_scales", config.noise_scales,
+                                   "a list of ascending numbers between 0 and 100", are_noise_scales);
+  fields.take<double>("distance_m", config.distance_m, "a number between 0.1 and 10",
+                      [](const double& d) { return d >= 0.1 && d <= 10.0; });
+  fields.take<bool>("known", config.known, "true or false");
+  fields.take<int>("samples", config.samples, "a whole number between 1 and 10000",
+                   [](const int& n) { return n >= 1 && n <= 10000; });
+  fields.take<int>("steps", config.steps, "a whole number between 1 and 10000",
+                   [](const int& n) { return n >= 1 && n <= 10000; });
+  fields.take<std::string>("model", config.model, "a file's path");
+  json tasks;
+  fields.take<json>("tasks", tasks, "a list of objects with task and objects",
+                    [](const json& list) { return list.is_array() && !list.empty(); });
+  fields.finish();
+  if (!tasks.is_null()) config.tasks.clear();
+  for (std::size_t i = 0; i < tasks.size(); ++i) {
+    config.tasks.push_back(task_from_json(tasks[i], source, "tasks[" + std::to_string(i) + "]"));
+  }
+  return config;
+}
+
+StudyConfig read_study_config(const std::string& path) {
+  StudyConfig config = study_config_from_json(read_file(path), path);
+  if (!config.model.empty()) config.model = (std::filesystem::path(path).parent_path() / config.model).string();
+  return config;
+}
+
+nlohmann::ordered_json to_json(const StudyConfig& config) {
+  nlohmann::ordered_json tasks = nlohmann::ordered_json::array();
+  for (const StudyTask& task : config.tasks) {
+    tasks.push_back({{"task", to_string(task.task)}, {"objects", task.objects}});
+  }
+  return {{"sensor", to_string(config.sensor)},
+          {"noise_scales", config.noise_scales},
+          {"distance_m", config.distance_m},
+          {"known", config.known},
+          {"tasks", tasks},
+          {"samples", config.samples},
+          {"steps", config.steps}};
+}
+
+double depth_sigma_mm(const StudyConfig& config, double noise_scale) {
+  const SensorTerms terms = sensor_terms(config.sensor);
+  return terms.axial_sigma == nullptr ? 0.0 : 1000.0 * noise_scale * terms.axial_sigma(config.distance_m, 0.0);
+}
+
+}  // namespace dofusion

@@ -1,0 +1,55 @@
+// Point clouds of the Point Cloud Library in and out. The one public header that includes PCL.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include "perception/camera.h"
+#include "perception/image.h"
+#include "perception/recovery.h"
+#include "perception/table.h"
+
+namespace dofusion {
+
+using Cloud = pcl::PointCloud<pcl::PointXYZ>;  // camera frame (x right, y down, z forward), metres
+
+// A PCD or PLY file. Throws InputError naming the file if it cannot be read or has no points.
+Cloud read_cloud(const std::string& path);
+
+// An organised cloud, one point a pixel; NaN where there is no reading.
+Cloud to_cloud(const DepthImage& depth, const Camera& camera);
+
+// A depth image of a cloud, with its camera.
+struct CloudView {
+  Camera camera;
+  DepthImage depth;
+};
+
+// An organised cloud keeps its pixels, and its camera is found from the points; an unorganised one (or an organised one
+// that no pinhole camera explains) is seen from the origin by a camera of `width` pixels that spans it, the nearest
+// point counting in each pixel. Points that are not finite or not before the camera are left out; nullopt if fewer
+// than three remain.
+std::optional<CloudView> view_cloud(const Cloud& cloud, int width = 640);
+
+struct CloudSegmentationOptions {
+  DepthSigma sigma;                  // of the points' depth
+  double table_band = 3.0;           // sigmas; points nearer to the plane belong to the table
+  double cluster_distance = 0.012;   // metres; points nearer to each other belong to one object
+  int min_points = 50;               // of an object
+};
+
+struct CloudSegmentation {
+  Table table;                       // T_world_camera takes the cloud's frame to the world
+  std::vector<std::uint8_t> labels;  // one a point: 0 nothing, 1 table, 2, 3, … objects by falling number of points
+};
+
+// The table and Euclidean clusters above it, for clouds without an image's order. Objects that touch are not parted;
+// for organised clouds `segment` on `view_cloud` does that. nullopt if there is no table. At most 254 objects.
+std::optional<CloudSegmentation> segment_cloud(const Cloud& cloud, const CloudSegmentationOptions& options = {});
+
+}  // namespace dofusion

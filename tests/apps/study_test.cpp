@@ -1,0 +1,316 @@
+#include "apps/study.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "apps/assets.h"
+#include "apps/study_report.h"
+#include "stability/files.h"
+#include "tests/temporary_directory.h"
+
+namespace dofusion {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+StudyRow made_up_row(std::int64_t trial, double noise_scale) {
+  StudyRow row;
+  row.trial = trial;
+  row.scene = trial / 2;
+  row.noise_scale = noise_scale;
+  row.sensor = "realsense";
+  row.distance_m = 0.7;
+  row.known = true;
+  row.task = "unstructured";
+  row.context = "cube+hat";
+  row.query = "tetrahedron";
+  row.objects_true = 2;
+  row.fewest_pixels = 1234;
+  row.objects_found = 2;
+  row.shapes_right = 2;
+  row.position_error_mean_mm = 0.5;
+  row.position_error_max_mm = 0.75;
+  row.pose_error_max_pct = 1.25;
+  row.table_angle_deg = 0.01;
+  row.table_offset_mm = 1.0 / 3.0;
+  row.candidates_stable = 5;
+  row.displacement_recovered_pct = 0.01;
+  row.displacement_recovered_deg = 0.02;
+  row.stable_recovered = true;
+  row.displacement_true_pct = 0.5;
+  row.displacement_true_deg = 0.25;
+  row.stable_true = true;
+  row.displacement_ground_truth_pct = 0.125;
+  row.displacement_ground_truth_deg = 0.25;
+  row.stable_ground_truth = true;
+  row.displacement_random_pct = 90.0;
+  row.displacement_random_deg = 60.0;
+  row.ms_recover = 800.0;
+  row.ms_place = 700.0;
+  return row;
+}
+
+// A trial in which no table was found.
+StudyRow without_table(StudyRow row) {
+  StudyRow bare;
+  bare.trial = row.trial;
+  bare.scene = row.scene;
+  bare.noise_scale = row.noise_scale;
+  bare.known = row.known;
+  bare.objects_true = row.objects_true;
+  bare.failure = first_failure(bare);
+  return bare;
+}
+
+std::string error_of(const std::string& json) {
+  try {
+    study_config_from_json(json, "study.json");
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(StudyConfig, DefaultsAndOwnValues) {
+  const StudyConfig plain = study_config_from_json("{}", "study.json");
+  EXPECT_EQ(plain.noise_scales, (std::vector<double>{0, 1, 2, 4}));
+  EXPECT_TRUE(plain.known);
+  ASSERT_EQ(plain.tasks.size(), 2u);
+
+  const StudyConfig own = study_config_from_json(
+      R"({"sensor": "kinect2", "noise_scales": [0.5, 3], "distance_m": 1, "known": false, "samples": 16, "steps": 20,
+          "tasks": [{"task": "stack", "objects": 3}], "model": "m.safetensors"})", "study.json");
+  EXPECT_EQ(own.sensor, SensorModel::kKinect2);
+  EXPECT_EQ(own.noise_scales, (std::vector<double>{0.5, 3}));
+  EXPECT_EQ(own.distance_m, 1.0);
+  EXPECT_FALSE(own.known);
+  EXPECT_EQ(own.tasks.at(0).task, Task::kStack);
+  EXPECT_EQ(own.tasks.at(0).objects, 3);
+  EXPECT_EQ(own.model, "m.safetensors");
+}
+
+TEST(StudyConfig, ErrorsNameFileAndField) {
+  EXPECT_THAT(error_of("{"), HasSubstr("study.json"));
+  EXPECT_THAT(error_of("[]"), HasSubstr("study.json"));
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {R"({"senser": "kinect"})", "senser"},
+      {R"({"sensor": "camera"})", "sensor"},
+      {R"({"sensor": 3})", "sensor"},
+      {R"({"noise_scales": []})", "noise_scales"},
+      {R"({"noise_scales": [1, 1]})", "noise_scales"},
+      {R"({"noise_scales": [-1]})", "noise_scales"},
+      {R"({"distance_m": "far"})", "distance_m"},
+      {R"({"distance_m": 0})", "distance_m"},
+      {R"({"known": 1})", "known"},
+      {R"({"samples": 0})", "samples"},
+      {R"({"steps": 1.5})", "steps"},
+      {R"({"model": ""})", "model"},
+      {R"({"tasks": []})", "tasks"},
+      {R"({"tasks": [{"objects": 2}]})", "tasks[0].task"},
+      {R"({"tasks": [{"task": "single"}, {"task": "heap", "objects": 2}]})", "tasks[1].task"},
+      {R"({"tasks": [{"task": "stack", "objects": 1}]})", "tasks[0].objects"},
+      {R"({"tasks": [{"task": "single", "colour": "red"}]})", "tasks[0].colour"},
+  };
+  for (const auto& [json, field] : cases) {
+    EXPECT_THAT(error_of(json), AllOf(HasSubstr("study.json"), HasSubstr("'" + field + "'"))) << json;
+  }
+}
+
+TEST(StudyConfig, ModelIsRelativeToTheFile) {
+  const TemporaryDirectory directory;
+  write_file(directory / "study.json", R"({"model": "models/mine.safetensors"})");
+  EXPECT_EQ(read_study_config(directory / "study.json").model, directory / "models/mine.safetensors");
+  EXPECT_THROW(read_study_config(directory / "none.json"), InputError);
+}
+
+TEST(StudyRows, SurviveCsv) {
+  for (const StudyRow& row : {made_up_row(7, 4.0), without_table(made_up_row(3, 0.1))}) {
+    const std::string line = to_csv_line(row);
+    const auto read = row_from_csv_line(line.substr(0, line.size() - 1));
+    ASSERT_TRUE(read);
+    EXPECT_EQ(to_csv_line(*read), line);
+    EXPECT_EQ(read->trial, row.trial);
+    EXPECT_EQ(read->noise_scale, row.noise_scale);
+    EXPECT_EQ(read->stable_true, row.stable_true);
+    EXPECT_EQ(read->position_error_mean_mm, row.position_error_mean_mm);
+  }
+  const std::string line = to_csv_line(without_table(made_up_row(0, 1.0)));
+  EXPECT_THAT(line, HasSubstr(",table,"));
+  EXPECT_FALSE(row_from_csv_line("1,2,3"));
+  EXPECT_FALSE(row_from_csv_line("x" + line.substr(0, line.size() - 1)));
+}
+
+TEST(FirstFailure, NamesTheFirstStepThatWentWrong) {
+  StudyRow row = made_up_row(0, 1.0);
+  row.pose_error_max_pct = 20.0;
+  EXPECT_EQ(first_failure(row), "");  // it stands
+  row.stable_true = false;
+  EXPECT_EQ(first_failure(row), "pose");
+  row.shapes_right = 1;
+  EXPECT_EQ(first_failure(row), "shape");
+  row.objects_found = 3;
+  EXPECT_EQ(first_failure(row), "segmentation");
+  row.table_angle_deg.reset();
+  EXPECT_EQ(first_failure(row), "table");
+  row = made_up_row(0, 1.0);
+  row.stable_true = false;
+  EXPECT_EQ(first_failure(row), "placement");
+}
+
+TEST(PartialRows, GoOnAfterACutLine) {
+  const TemporaryDirectory directory;
+  const std::string file = directory / "study.partial.csv", settings = R"({"seed": 1})";
+  {
+    PartialRows rows(file, settings);
+    for (const int trial : {2, 0, 1}) rows.add(made_up_row(trial, trial));
+  }
+  const std::string whole = read_file(file);
+  write_file(file, whole.substr(0, whole.size() - 20));  // the last row, of trial 1, is cut
+
+  PartialRows rows(file, settings);
+  EXPECT_TRUE(rows.has(0));
+  EXPECT_FALSE(rows.has(1));
+  EXPECT_TRUE(rows.has(2));
+  rows.add(made_up_row(1, 1.0));
+  EXPECT_EQ(rows.count(2), 2);
+  EXPECT_EQ(trials_csv(rows.rows(3)), trials_csv({made_up_row(0, 0.0), made_up_row(1, 1.0), made_up_row(2, 2.0)}));
+  EXPECT_EQ(trials_csv(PartialRows(file, settings).rows(3)), trials_csv(rows.rows(3)));
+}
+
+TEST(PartialRows, RefuseOtherSettingsAndDamage) {
+  const TemporaryDirectory directory;
+  const std::string file = directory / "study.partial.csv";
+  { PartialRows(file, "{1}").add(made_up_row(0, 0.0)); }
+  EXPECT_THROW(PartialRows(file, "{2}"), InputError);
+  write_file(file, read_file(file) + "nonsense\n");
+  EXPECT_THROW(PartialRows(file, "{1}"), InputError);
+  EXPECT_THROW(PartialRows(directory / "none/study.partial.csv", "{1}"), InputError);
+}
+
+// Two scenes at two scales; one trial has no table.
+std::vector<StudyRow> four_rows() {
+  std::vector<StudyRow> rows = {made_up_row(0, 0.0), made_up_row(1, 1.0), made_up_row(2, 0.0), made_up_row(3, 1.0)};
+  rows[0].displacement_true_pct = 1.0;
+  rows[2].displacement_true_pct = 3.0;
+  rows[2].displacement_random_pct = 110.0;
+  rows[2].stable_ground_truth = false;
+  rows[3] = without_table(rows[3]);
+  return rows;
+}
+
+TEST(StudySummary, IsWhatAHandWorksOut) {
+  StudyConfig config;
+  config.noise_scales = {0.0, 1.0, 2.0};
+  const StudySummary summary = summarise(four_rows(), config, 0);
+  EXPECT_EQ(summary.trials, 4);
+  EXPECT_EQ(summary.scenes, 2);
+  ASSERT_EQ(summary.points.size(), 2u);  // nothing was tried at 2
+
+  const StudyPoint& exact = summary.points[0];
+  EXPECT_EQ(exact.trials, 2);
+  EXPECT_DOUBLE_EQ(exact.medians.at("displacement_true_pct").value, 2.0);  // of 1 and 3
+  EXPECT_GE(exact.medians.at("displacement_true_pct").interval.low, 1.0);
+  EXPECT_LE(exact.medians.at("displacement_true_pct").interval.high, 3.0);
+  EXPECT_DOUBLE_EQ(exact.shares.at("stable_true").value, 1.0);
+  EXPECT_EQ(exact.depth_sigma_mm, 0.0);
+
+  const StudyPoint& noisy = summary.points[1];
+  EXPECT_DOUBLE_EQ(noisy.shares.at("stable_true").value, 0.5);
+  EXPECT_DOUBLE_EQ(noisy.shares.at("objects_right").value, 0.5);
+  EXPECT_DOUBLE_EQ(noisy.failures.at("table"), 0.5);
+  EXPECT_TRUE(std::isinf(noisy.medians.at("displacement_true_pct").value));  // one of two has none
+  EXPECT_DOUBLE_EQ(noisy.medians.at("table_angle_deg").value, 0.01);         // of the one that has it
+  EXPECT_EQ(noisy.medians.at("table_angle_deg").count, 1);
+  EXPECT_NEAR(noisy.depth_sigma_mm, 1.85, 0.005);  // Intel's figure for a D435 at 0.7 m
+
+  // Each scene once, whatever the number of its trials.
+  EXPECT_DOUBLE_EQ(summary.random.pct.value, 100.0);
+  EXPECT_EQ(summary.random.pct.count, 2);
+  EXPECT_DOUBLE_EQ(summary.ground_truth.stable.value, 0.5);
+
+  double sum = noisy.shares.at("stable_true").value;
+  for (const auto& [name, share] : noisy.failures) sum += share;
+  EXPECT_DOUBLE_EQ(sum, 1.0);
+}
+
+TEST(StudyReport, HasNoNumberWhereThereIsNone) {
+  StudyConfig config;
+  config.noise_scales = {0.0, 1.0};
+  const StudySummary summary = summarise(four_rows(), config, 0);
+  const nlohmann::ordered_json json = to_json(summary, R"({"format": "dofusion-study", "seed": 0})");
+  EXPECT_EQ(json["trials"], 4);
+  EXPECT_DOUBLE_EQ(json["noise"][0]["displacement_true_pct"]["median"].get<double>(), 2.0);
+  EXPECT_TRUE(json["noise"][1]["displacement_true_pct"]["median"].is_null());
+
+  const std::string svg = displacement_svg(summary, config);
+  EXPECT_THAT(svg, AllOf(HasSubstr("<svg"), HasSubstr("random placement"), HasSubstr("</svg>")));
+  const std::string html = study_html(summary, config, 0);
+  for (const std::string& page : {svg, html, success_svg(summary, config)}) {
+    EXPECT_EQ(page.find("nan"), std::string::npos);
+    EXPECT_EQ(page.find("inf\""), std::string::npos);
+  }
+  EXPECT_EQ(html.find("http://"), html.find("http://www.w3.org/2000/svg"));  // nothing is loaded from elsewhere
+  EXPECT_EQ(html.find("<script"), std::string::npos);
+}
+
+// The model that DOFUSION_TEST_MODEL names, or the shipped one.
+std::string test_model() {
+  const char* chosen = std::getenv("DOFUSION_TEST_MODEL");
+  return chosen != nullptr ? chosen : std::string(DOFUSION_ASSETS_DIR) + "/models/default.safetensors";
+}
+
+// All but the two columns of times.
+std::string without_times(std::string csv_line) {
+  for (int k = 0; k < 2; ++k) csv_line.erase(csv_line.rfind(','));
+  return csv_line;
+}
+
+TEST(Study, IsTheSameResumedAndOnTwoThreads) {
+  if (!std::filesystem::exists(test_model())) GTEST_SKIP() << "no model at " << test_model();
+  const TemporaryDirectory directory;
+  StudyJob job;
+  job.config.model = test_model();
+  job.config.noise_scales = {0.0, 2.0};
+  job.config.samples = 2;
+  job.config.steps = 10;
+  job.trials = 4;
+  job.seed = 5;
+  job.partial = directory / "whole.csv";
+  const std::vector<StudyRow> whole = run_study(job);
+  ASSERT_EQ(whole.size(), 4u);
+  for (std::size_t i = 0; i < whole.size(); ++i) {
+    EXPECT_EQ(whole[i].trial, static_cast<std::int64_t>(i));
+    EXPECT_EQ(whole[i].scene, whole[i].trial / 2);
+    EXPECT_EQ(whole[i].noise_scale, i % 2 == 0 ? 0.0 : 2.0);
+    EXPECT_GT(whole[i].fewest_pixels, 0);
+    EXPECT_EQ(whole[i].failure, first_failure(whole[i]));
+  }
+  // An exact image gives the table exactly: depth is in steps of nothing, rays and planes in double precision.
+  ASSERT_TRUE(whole[0].table_angle_deg);
+  EXPECT_LT(*whole[0].table_angle_deg, 0.01);
+  EXPECT_LT(*whole[0].table_offset_mm, 0.1);
+
+  job.partial = directory / "cut.csv";
+  job.threads = 2;
+  const std::string text = read_file(directory / "whole.csv");
+  write_file(job.partial, text.substr(0, text.size() - 30));
+  const std::vector<StudyRow> resumed = run_study(job);
+  ASSERT_EQ(resumed.size(), whole.size());
+  for (std::size_t i = 0; i < whole.size(); ++i) {
+    EXPECT_EQ(without_times(to_csv_line(resumed[i])), without_times(to_csv_line(whole[i])));
+  }
+  job.partial = directory / "threads.csv";
+  const std::vector<StudyRow> threaded = run_study(job);
+  for (std::size_t i = 0; i < whole.size(); ++i) {
+    EXPECT_EQ(without_times(to_csv_line(threaded[i])), without_times(to_csv_line(whole[i])));
+  }
+}
+
+}  // namespace
+}  // namespace dofusion

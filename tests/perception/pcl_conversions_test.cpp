@@ -1,0 +1,55 @@
+#include "perception/pcl_conversions.h"
+
+#include <gtest/gtest.h>
+
+#include "box_image.h"
+#include "perception/segmentation.h"
+#include "stability/files.h"
+
+namespace dofusion {
+namespace {
+
+const Pose kView = look_at({0.1, -0.55, 0.5}, {0.0, 0.0, 0.03});
+
+BoxImage two_boxes() {
+  return render_boxes({upright_box({0.1, 0.06, 0.08}, {-0.09, 0, 0.04}, 0.3), upright_box({0.06, 0.06, 0.12}, {0.09, 0.02, 0.06}, 0.9)},
+                      test_camera(), kView, {0.0, 1.7e-3}, 9);
+}
+
+TEST(PclConversions, AnOrganisedCloudGivesImageAndCameraBack) {
+  BoxImage image = two_boxes();
+  image.depth.at(7, 9) = 0.0F;
+  const std::optional<CloudView> view = view_cloud(to_cloud(image.depth, test_camera()));
+  ASSERT_TRUE(view);
+  EXPECT_NEAR(view->camera.fx, 525.0, 0.01);
+  EXPECT_NEAR(view->camera.cx, 159.5, 0.01);
+  EXPECT_EQ(view->depth.pixels, image.depth.pixels);
+}
+
+TEST(PclConversions, AnUnorganisedCloudIsSegmented) {
+  const BoxImage image = two_boxes();
+  Cloud cloud;
+  for (const pcl::PointXYZ& p : to_cloud(image.depth, test_camera())) cloud.push_back(p);
+  const std::optional<CloudSegmentation> found = segment_cloud(cloud);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(*std::max_element(found->labels.begin(), found->labels.end()), 3);
+  EXPECT_NEAR(found->table.T_world_camera.translation().z(), 0.5, 1e-3);
+  const std::optional<CloudView> view = view_cloud(cloud);
+  ASSERT_TRUE(view);
+  const std::optional<Table> table = find_table(view->depth, view->camera);
+  ASSERT_TRUE(table);
+  EXPECT_EQ(count_objects(segment(view->depth, view->camera, *table)), 2);
+}
+
+TEST(PclConversions, DegenerateCloudsGiveNothing) {
+  EXPECT_FALSE(view_cloud({}));
+  EXPECT_FALSE(segment_cloud({}));
+  Cloud line;
+  for (int i = 0; i < 10; ++i) line.push_back({0.0F, 0.0F, 1.0F});
+  EXPECT_FALSE(view_cloud(line));
+  EXPECT_THROW(read_cloud("no/such/file.pcd"), InputError);
+  EXPECT_THROW(read_cloud("cloud.txt"), InputError);
+}
+
+}  // namespace
+}  // namespace dofusion
