@@ -1,7 +1,10 @@
 #include "apps/place_report.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
+
+#include <Eigen/Geometry>
 
 #include "apps/html.h"
 #include "apps/program.h"
@@ -32,8 +35,37 @@ Scene with_query(const Scene& context, const ObjectPtr& query, const std::vector
 
 std::vector<Pose> generated_poses(const Scene& context, const Placement& placement) {
   std::vector<Pose> poses = context.T_world_object;
-  poses.push_back(placement.T_world_query);
+  poses.push_back(placement.T_world_sampled);
   return poses;
+}
+
+// The depth camera zoomed to the part of its image that shows the objects and the best placements, with a border.
+Camera zoomed_camera(const PlaceInputs& inputs, const PlaceResult& result, std::size_t shown) {
+  Eigen::AlignedBox2d seen;
+  const Pose T_camera_world = result.recovered.table->T_world_camera.inverse();
+  const auto include = [&](const Object& object, const Pose& T_world_object) {
+    for (const Eigen::Vector3d& v : object.mesh.vertices) {
+      const Eigen::Vector3d p = T_camera_world * (T_world_object * v);
+      if (p.z() > 0.01) seen.extend(project(inputs.camera, p));
+    }
+  };
+  const Scene& context = result.recovered.scene;
+  for (std::size_t i = 0; i < context.objects.size(); ++i) include(*context.objects[i], context.T_world_object[i]);
+  for (std::size_t k = 0; k < shown; ++k) {
+    include(*inputs.query, result.placements[k].T_world_sampled);
+    include(*inputs.query, result.placements[k].settled.back());
+  }
+  if (seen.isEmpty()) return resized(inputs.camera, static_cast<double>(kPictureWidth) / inputs.camera.width);
+  const double width = std::max({seen.sizes().x() * 1.5, seen.sizes().y() * 1.5 * 4.0 / 3.0, 80.0});
+  const double zoom = kPictureWidth / width;
+  Camera camera = inputs.camera;
+  camera.width = kPictureWidth;
+  camera.height = kPictureWidth * 3 / 4;
+  camera.fx *= zoom;
+  camera.fy *= zoom;
+  camera.cx = (camera.cx - seen.center().x()) * zoom + camera.width / 2.0;
+  camera.cy = (camera.cy - seen.center().y()) * zoom + camera.height / 2.0;
+  return camera;
 }
 
 std::string verdict(const Placement& placement) {
@@ -96,7 +128,8 @@ ReportPictures render_pictures(const PlaceInputs& inputs, const PlaceResult& res
   // Picture 0 is the recovered scene; then before and after of each of the best.
   const std::size_t shown = std::min(kShownPlacements, result.placements.size());
   const Scene& context = result.recovered.scene;
-  const Camera camera = resized(inputs.camera, std::min(1.0, static_cast<double>(kPictureWidth) / inputs.camera.width));
+  const Camera whole = resized(inputs.camera, std::min(1.0, static_cast<double>(kPictureWidth) / inputs.camera.width));
+  const Camera close = zoomed_camera(inputs, result, shown);
   const Pose& T_world_camera = result.recovered.table->T_world_camera;
   std::vector<std::string> rendered(1 + 2 * shown);
   parallel_for(static_cast<std::int64_t>(rendered.size()), threads, [&](std::int64_t i, int) {
@@ -108,7 +141,7 @@ ReportPictures render_pictures(const PlaceInputs& inputs, const PlaceResult& res
       scene = with_query(context, inputs.query, before ? generated_poses(context, placement) : placement.settled);
       options.highlighted = static_cast<int>(context.objects.size());
     }
-    rendered[static_cast<std::size_t>(i)] = to_png(shaded_picture(scene, camera, T_world_camera, options));
+    rendered[static_cast<std::size_t>(i)] = to_png(shaded_picture(scene, i == 0 ? whole : close, T_world_camera, options));
   });
   pictures.recovered = rendered[0];
   for (std::size_t k = 0; k < shown; ++k) pictures.best.push_back({k + 1, rendered[1 + 2 * k], rendered[2 + 2 * k]});
@@ -138,11 +171,11 @@ std::string report_html(const PlaceInputs& inputs, const PlaceArguments& argumen
             " degrees.</p>\n";
   }
   if (!pictures.best.empty()) {
-    html += "<h2>The best placements, as proposed and as they settled</h2>\n<div class=\"pairs\">\n";
+    html += "<h2>The best placements, as generated and as they settle</h2>\n<div class=\"pairs\">\n";
     for (const auto& best : pictures.best) {
       const Placement& p = result.placements[best.rank - 1];
-      html += figure(best.before, "Rank " + std::to_string(best.rank) + " as proposed") +
-              figure(best.after, "Rank " + std::to_string(best.rank) + " settled: moved by " +
+      html += figure(best.before, "Rank " + std::to_string(best.rank) + " as the model generates it") +
+              figure(best.after, "Rank " + std::to_string(best.rank) + " settled; placed there, things move by " +
                                      number(p.displacement.translation_pct) + " % and " +
                                      number(p.displacement.rotation_deg) + "°");
     }

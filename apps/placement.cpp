@@ -18,7 +18,7 @@ class Checker {
 
   Placement check(const Pose& T_world_query) const {
     Placement placement;
-    placement.T_world_query = T_world_query;
+    placement.T_world_query = placement.T_world_sampled = T_world_query;
     std::vector<Pose> start = context_;
     start.push_back(T_world_query);
     const SettleResult settled = simulator_.settle(start);
@@ -118,7 +118,8 @@ std::vector<Placement> check_placements(const Scene& scene, const ObjectPtr& que
     Placement& placement = placements[static_cast<std::size_t>(i)];
     placement = checker.check(candidates[static_cast<std::size_t>(i)]);
     if (!options.polish || !placement.stable) return;
-    const Placement polished = checker.check(placement.settled.back());
+    Placement polished = checker.check(placement.settled.back());
+    polished.T_world_sampled = placement.T_world_sampled;
     if (moves_less(polished, placement)) placement = polished;
   });
 

@@ -26,6 +26,7 @@ struct PlacementOptions {
 
 struct Placement {
   Pose T_world_query = Pose::Identity();
+  Pose T_world_sampled = Pose::Identity();  // what the model generated; the same unless polished
   SettleStatus status = SettleStatus::kDiverged;
   bool stable = false;                 // settled, and nothing moved more than 10 % and 10°
   Displacement displacement;           // the largest over all objects; infinite if the simulation diverged

@@ -54,6 +54,7 @@ class FaceFinder {
 
   FaceMap find() {
     fit_surroundings();
+    claim_for_fixed();
     for (const int seed : seeds_by_flatness()) grow(seed);
     for (int i = 0; i < options_.iterations; ++i) {
       compete();
@@ -142,7 +143,7 @@ class FaceFinder {
   }
 
   void grow(int seed) {
-    if (map_.index.pixels[seed] != kNoFace || belongs_to_fixed(seed)) return;
+    if (map_.index.pixels[seed] != kNoFace) return;
     const int face = static_cast<int>(map_.faces.size());
     const float cosine = static_cast<float>(std::cos(options_.normal_deg * M_PI / 180.0));
     InversePlane plane = local_[seed].plane;
@@ -180,14 +181,16 @@ class FaceFinder {
     }
   }
 
-  bool belongs_to_fixed(int p) const {
-    for (int f = 0; f < fixed_; ++f) {
-      if (std::abs(deviation(p, map_.faces[f].plane)) < 2.0 &&
-          local_[p].normal.dot(map_.faces[f].normal().cast<float>()) > 0.95F) {
-        return true;
+  // Readings on a fixed face whose surroundings lie like it do not start or join another face; the competition may
+  // still give them to one.
+  void claim_for_fixed() {
+    constexpr float kAlike = 0.9F;  // cosine
+    for (const int p : readings_) {
+      for (int f = 0; f < fixed_; ++f) {
+        const bool alike = local_[p].normal.dot(map_.faces[f].normal().cast<float>()) > kAlike;
+        if (alike && std::abs(deviation(p, map_.faces[f].plane)) < options_.grow) map_.index.pixels[p] = f;
       }
     }
-    return false;
   }
 
   // Every reading goes to the face, among those of its neighbours, that fits its surroundings best.
