@@ -24,8 +24,10 @@ constexpr double kDisplayFloor = 0.001;  // per cent or degrees; less is nothing
 std::string number(double value) {
   if (std::isnan(value)) return "–";
   if (std::isinf(value)) return "∞";
+  if (value > 0.0 && value < 0.001) return "<0.001";
   char buffer[32];
-  std::snprintf(buffer, sizeof buffer, value == 0.0 ? "%.0f" : value < 0.1 ? "%.3f" : value < 10.0 ? "%.2f" : "%.1f", value);
+  const int digits = value == 0.0 || value >= 99.95 ? 0 : value < 0.1 ? 3 : value < 10.0 ? 2 : 1;
+  std::snprintf(buffer, sizeof buffer, "%.*f", digits, value);
   return buffer;
 }
 
@@ -66,7 +68,7 @@ PlotAxis noise_axis(const StudySummary& summary, const StudyConfig& config) {
   PlotAxis axis;
   axis.title = "noise scale of " + sensor_title(config.sensor) + "; below: depth σ at " + plain(config.distance_m) + " m";
   for (const StudyPoint& p : summary.points) {
-    axis.ticks.push_back({p.noise_scale, plain(p.noise_scale), one_decimal(p.depth_sigma_mm) + " mm"});
+    axis.ticks.push_back({p.noise_scale, plain(p.noise_scale), (p.depth_sigma_mm == 0.0 ? "0" : one_decimal(p.depth_sigma_mm)) + " mm"});
   }
   const double first = axis.ticks.front().at, last = axis.ticks.back().at;
   const double margin = last > first ? 0.06 * (last - first) : 0.5;
@@ -123,7 +125,7 @@ PlotPanel displacement_panel(const StudySummary& summary, const StudyConfig& con
 }
 
 PlotAxis share_axis(const std::string& title) {
-  PlotAxis axis{title, 0.0, 100.0, false, {}};
+  PlotAxis axis{title, -4.0, 104.0, false, {}};
   for (int pct = 0; pct <= 100; pct += 20) axis.ticks.push_back({static_cast<double>(pct), std::to_string(pct), ""});
   return axis;
 }
@@ -176,6 +178,7 @@ PlotPanel failure_panel(const StudySummary& summary, const StudyConfig& config) 
   }
   panel.y = share_axis("share of the trials, %");
   const double step = highest <= 10.0 ? 2.0 : highest <= 25.0 ? 5.0 : highest <= 50.0 ? 10.0 : 20.0;
+  panel.y.low = 0.0;
   panel.y.high = std::max(step * std::ceil(highest / step), 2.0 * step);
   panel.y.ticks.clear();
   for (double at = 0.0; at <= panel.y.high + 1e-9; at += step) panel.y.ticks.push_back({at, plain(at), ""});
@@ -193,8 +196,8 @@ std::string trials_per_scale(const StudySummary& summary) {
 
 std::string cell(const Estimate& e, double factor = 1.0) {
   if (e.count == 0) return "<td>–</td>";
-  return "<td>" + number(factor * e.value) + " <small>" + number(factor * e.interval.low) + " … " +
-         number(factor * e.interval.high) + "</small></td>";
+  return "<td>" + html_escaped(number(factor * e.value)) + " <small>" + html_escaped(number(factor * e.interval.low)) +
+         " … " + html_escaped(number(factor * e.interval.high)) + "</small></td>";
 }
 
 struct TableRow {
@@ -257,11 +260,11 @@ std::string reference_table(const StudySummary& summary) {
 
 // Besides the reports' common style: tables that scroll on a narrow screen, and what print needs.
 constexpr const char* kStyle = R"(<style>
-  figure { margin: 14px 0; } figure svg { width: 100%; height: auto; } .wide { overflow-x: auto; }
+  figure { margin: 14px 0; overflow-x: auto; } figure svg { width: 100%; min-width: 640px; height: auto; } .wide { overflow-x: auto; }
   td { white-space: nowrap; } td:first-child { white-space: normal; min-width: 13em; } td small { color: var(--soft); }
   thead tr:last-child > * { border-bottom: 2px solid var(--ink); } table { margin: 10px 0 18px; }
   @media print { body { background: none; } main { padding: 0; } h2 { break-after: avoid; }
-                 figure, table { break-inside: avoid; } }
+                 figure, table { break-inside: avoid; } figure svg { min-width: 0; } }
 </style>
 )";
 
@@ -269,8 +272,10 @@ std::string lead(const StudySummary& summary, const StudyConfig& config) {
   const StudyPoint& first = summary.points.front();
   const StudyPoint& last = summary.points.back();
   const auto clause = [](const StudyPoint& p) {
-    return number(100.0 * p.shares.at("stable_true").value) + " % of the placements stand in the true scene at " +
-           plain(p.noise_scale) + " times the sensor's noise (σ " + one_decimal(p.depth_sigma_mm) + " mm)";
+    const std::string noise = p.noise_scale == 0.0   ? "without noise"
+                              : p.noise_scale == 1.0 ? "at the sensor's own noise"
+                                                     : "at " + plain(p.noise_scale) + " times the sensor's noise";
+    return number(100.0 * p.shares.at("stable_true").value) + " % of the placements stand in the true scene " + noise;
   };
   return "<p class=\"lead\">" + std::to_string(summary.trials) + " trials on " + std::to_string(summary.scenes) + " scenes, one view with " +
          sensor_title(config.sensor) + " at " + plain(config.distance_m) + " m, objects " +
@@ -289,7 +294,9 @@ std::string method(const StudyConfig& config, std::uint64_t seed) {
          "Seed " + std::to_string(seed) + ".</p>\n"
          "<p>A displacement is the largest over all objects, context and query: translation in per cent of that object's "
          "diameter, and rotation. A placement stands if the scene comes to rest with both under 10 % and 10°. A trial "
-         "without a displacement (no table was found, or the simulation diverged) counts as larger than any. "
+         "without a displacement (no table was found, or the simulation diverged) counts as larger than any. A candidate "
+         "that stands is replaced by the pose at which it came to rest, so that in the scene it was made for, the recovered "
+         "one, next to nothing is left to move. "
          "What failed first is told of trials whose placement does not stand in the true scene: no table; a wrong number "
          "of objects; a known object taken for another; an object off by more than " + plain(kPoseErrorPct) +
          " % of its diameter; or, with all that right, the placement itself.</p>\n"
@@ -316,8 +323,8 @@ std::string displacement_svg(const StudySummary& summary, const StudyConfig& con
 
 std::string success_svg(const StudySummary& summary, const StudyConfig& config) {
   return draw_figure({success_panel(summary, config), failure_panel(summary, config)},
-                     {trials_per_scale(summary) + " trials a noise scale; bands: 95 % bootstrap intervals. Stands: at rest within "
-                      "10 % of the diameter and 10° of where it was put, like all others.",
+                     {trials_per_scale(summary) + " trials a noise scale; bands: 95 % bootstrap intervals. A placement stands if "
+                      "nothing moves more than 10 % of its diameter and 10°.",
                       "Right: trials whose placement does not stand in the true scene, by the first step that went wrong."});
 }
 

@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kWidth = 960.0, kLegendRow = 22.0, kTop = 12.0, kTitle = 26.0, kPlotHeight = 300.0;
 constexpr double kLeftMargin = 66.0, kRightMargin = 14.0, kBottomMargin = 64.0, kCaptionRow = 18.0;
+constexpr double kAside = 8.0;  // between the curves of a panel
 constexpr const char* kInk = "#222222";
 constexpr const char* kGrid = "#dddddd";
 
@@ -56,7 +57,7 @@ struct Frame {
   double left, top, right, bottom;
 
   static double along(const PlotAxis& axis, double value) {
-    const double v = std::clamp(value, std::min(axis.low, axis.high), std::max(axis.low, axis.high));
+    const double v = std::clamp(std::max(value, axis.floor), axis.low, axis.high);
     return axis.logarithmic ? std::log(v / axis.low) / std::log(axis.high / axis.low)
                             : (v - axis.low) / (axis.high - axis.low);
   }
@@ -90,7 +91,7 @@ std::string draw_reference(const Frame& f, const PlotReference& reference) {
   if (!std::isfinite(reference.y)) return "";
   const double high = std::isfinite(reference.high) ? f.y(reference.high) : f.top;
   const double low = std::isfinite(reference.low) ? f.y(reference.low) : f.bottom;
-  return format("<rect x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\" fill=\"%s\" opacity=\"0.13\"/>\n", f.left,
+  return format("<rect x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\" fill=\"%s\" opacity=\"0.11\"/>\n", f.left,
                 high, f.right - f.left, std::max(0.0, low - high), reference.colour.c_str()) +
          line(f.left, f.y(reference.y), f.right, f.y(reference.y), stroke(reference.colour, 2.0, reference.dashes));
 }
@@ -111,26 +112,27 @@ std::vector<std::vector<PlotPoint>> unbroken(const std::vector<PlotPoint>& point
   return runs;
 }
 
-std::string draw_band(const Frame& f, const PlotCurve& curve) {
+// `aside`: units to the right of where the curve belongs.
+std::string draw_band(const Frame& f, const PlotCurve& curve, double aside) {
   std::string svg;
   for (const auto& run : unbroken(curve.points)) {
     if (run.empty()) continue;
     std::string corners;
-    for (const PlotPoint& p : run) corners += format("%.1f,%.1f ", f.x(p.x), f.y(std::isnan(p.high) ? p.y : p.high));
+    for (const PlotPoint& p : run) corners += format("%.1f,%.1f ", f.x(p.x) + aside, f.y(std::isnan(p.high) ? p.y : p.high));
     for (auto p = run.rbegin(); p != run.rend(); ++p)
-      corners += format("%.1f,%.1f ", f.x(p->x), f.y(std::isnan(p->low) ? p->y : p->low));
+      corners += format("%.1f,%.1f ", f.x(p->x) + aside, f.y(std::isnan(p->low) ? p->y : p->low));
     svg += "<polygon points=\"" + corners + "\" fill=\"" + curve.colour + "\" opacity=\"0.20\"/>\n";
   }
   return svg;
 }
 
-std::string draw_curve(const Frame& f, const PlotCurve& curve) {
+std::string draw_curve(const Frame& f, const PlotCurve& curve, double aside) {
   std::string svg;
   for (const auto& run : unbroken(curve.points)) {
     std::string corners, markers;
     for (const PlotPoint& p : run) {
-      corners += format("%.1f,%.1f ", f.x(p.x), f.y(p.y));
-      markers += marker(curve.marker, f.x(p.x), f.y(p.y), curve.colour);
+      corners += format("%.1f,%.1f ", f.x(p.x) + aside, f.y(p.y));
+      markers += marker(curve.marker, f.x(p.x) + aside, f.y(p.y), curve.colour);
     }
     svg += "<polyline points=\"" + corners + "\" fill=\"none\" " + stroke(curve.colour, 2.4) + "/>\n" + markers;
   }
@@ -166,8 +168,11 @@ std::string draw_panel(const Frame& f) {
   std::string svg = draw_axes(f) + draw_bars(f);
   for (const PlotLimit& limit : f.panel.limits) svg += draw_limit(f, limit);
   for (const PlotReference& reference : f.panel.references) svg += draw_reference(f, reference);
-  for (const PlotCurve& curve : f.panel.curves) svg += draw_band(f, curve);
-  for (const PlotCurve& curve : f.panel.curves) svg += draw_curve(f, curve);
+  const auto aside = [&](std::size_t i) {
+    return kAside * (static_cast<double>(i) - 0.5 * static_cast<double>(f.panel.curves.size() - 1));
+  };
+  for (std::size_t i = 0; i < f.panel.curves.size(); ++i) svg += draw_band(f, f.panel.curves[i], aside(i));
+  for (std::size_t i = 0; i < f.panel.curves.size(); ++i) svg += draw_curve(f, f.panel.curves[i], aside(i));
   return svg;
 }
 
@@ -208,7 +213,7 @@ std::string draw_legend(const std::vector<PlotPanel>& panels, double& height) {
   for (const PlotPanel& panel : panels) {
     for (const PlotPart& part : panel.parts) {
       const double at = place(part.name);
-      svg += swatch(part, at + 16.0, y, 18.0, 14.0) + text(at + 42.0, y + 11.5, part.name);
+      svg += swatch(part, at, y, 34.0, 14.0) + text(at + 42.0, y + 11.5, part.name);
     }
   }
   height = y + kLegendRow;
@@ -218,7 +223,7 @@ std::string draw_legend(const std::vector<PlotPanel>& panels, double& height) {
 }  // namespace
 
 PlotAxis log_axis(const std::string& title, double low, double high) {
-  PlotAxis axis{title, low, high, true, {}};
+  PlotAxis axis{title, 0.6 * low, high, true, {}, low};
   for (double at = low; at < high * 1.001; at *= 10.0) {
     axis.ticks.push_back({at, (axis.ticks.empty() ? "≤ " : "") + format("%g", at), ""});
   }

@@ -1,6 +1,7 @@
 // Curves with bands and stacked bars as SVG text, readable in print.
 #pragma once
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,7 @@ struct PlotAxis {
   double low = 0.0, high = 1.0;
   bool logarithmic = false;
   std::vector<PlotTick> ticks;
+  double floor = -std::numeric_limits<double>::infinity();  // smaller values are drawn here
 };
 
 struct PlotPoint {
@@ -26,7 +28,8 @@ struct PlotPoint {
 
 enum class Marker { kCircle, kSquare, kDiamond };
 
-// Points that are not finite break the curve; what lies outside the axis is drawn at its border.
+// Points that are not finite break the curve; what lies outside the axis is drawn at its border. Curves of one panel are
+// drawn a few units beside one another, so that equal ones are both seen.
 struct PlotCurve {
   std::string name, colour;
   Marker marker = Marker::kCircle;
@@ -51,7 +54,7 @@ struct PlotBar {
 };
 struct PlotPart {
   std::string name, colour;
-  bool hatched = false;  // besides its colour, so that neighbours differ in grey
+  bool hatched = false;  // besides its colour, so that neighbours differ in print
 };
 
 struct PlotPanel {
@@ -68,7 +71,7 @@ struct PlotPanel {
 // caption's lines underneath. The width is 960 units.
 std::string draw_figure(const std::vector<PlotPanel>& panels, const std::vector<std::string>& caption);
 
-// Decades from `low` to `high` as ticks; the first label is "≤ low".
+// Decades from `low` to `high` as ticks; the first label is "≤ low", and there is a little room below it.
 PlotAxis log_axis(const std::string& title, double low, double high);
 
 }  // namespace dofusion

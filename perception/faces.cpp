@@ -53,8 +53,8 @@ class FaceFinder {
   }
 
   FaceMap find() {
-    fit_surroundings();
     claim_for_fixed();
+    fit_surroundings();
     for (const int seed : seeds_by_flatness()) grow(seed);
     for (int i = 0; i < options_.iterations; ++i) {
       compete();
@@ -98,10 +98,26 @@ class FaceFinder {
     return plane;
   }
 
-  // A plane through every reading's surroundings, without what lies across a depth step.
-  void fit_surroundings() {
+  // Readings on a fixed face whose surroundings lie like it neither start nor join another face, nor count among
+  // the surroundings of others; the competition may still give them away.
+  void claim_for_fixed() {
+    constexpr float kAlike = 0.9F;  // cosine
     local_.resize(inverse_.size());
-    for (const int p : readings_) local_[p] = fit_around(p);
+    std::vector<std::pair<int, int>> claims;
+    for (const int p : readings_) {
+      for (int f = 0; f < fixed_; ++f) {
+        if (std::abs(deviation(p, map_.faces[f].plane)) > options_.grow) continue;
+        if (fit_around(p).normal.dot(map_.faces[f].normal().cast<float>()) > kAlike) claims.emplace_back(p, f);
+      }
+    }
+    for (const auto& [p, f] : claims) map_.index.pixels[p] = f;
+  }
+
+  // A plane through the surroundings of every reading that is left, without what lies across a depth step.
+  void fit_surroundings() {
+    for (const int p : readings_) {
+      if (map_.index.pixels[p] == kNoFace) local_[p] = fit_around(p);
+    }
   }
 
   LocalFit fit_around(int p) const {
@@ -115,7 +131,7 @@ class FaceFinder {
     for (int v = std::max(0, v0 - radius); v <= std::min(height_ - 1, v0 + radius); v += step) {
       for (int u = std::max(0, u0 - radius); u <= std::min(width_ - 1, u0 + radius); u += step) {
         const int q = pixel(v, u);
-        if (inverse_[q] <= 0.0F) continue;
+        if (inverse_[q] <= 0.0F || map_.index.pixels[q] != kNoFace) continue;
         const double reach = kSteepest * z / camera_.fx * std::hypot(u - u0, v - v0) + 4.0 * sigma_z;
         if (std::abs(inverse_[q] - inverse_[p]) * z * z > reach) continue;
         // About the centre: x, y in the offset, so that the normal equations are well conditioned.
@@ -178,18 +194,6 @@ class FaceFinder {
       map_.faces.push_back({*final_plane, sums.count, 0.0, Eigen::Matrix3d::Zero()});
     } else {
       for (const int p : members) map_.index.pixels[p] = kNoFace;
-    }
-  }
-
-  // Readings on a fixed face whose surroundings lie like it do not start or join another face; the competition may
-  // still give them to one.
-  void claim_for_fixed() {
-    constexpr float kAlike = 0.9F;  // cosine
-    for (const int p : readings_) {
-      for (int f = 0; f < fixed_; ++f) {
-        const bool alike = local_[p].normal.dot(map_.faces[f].normal().cast<float>()) > kAlike;
-        if (alike && std::abs(deviation(p, map_.faces[f].plane)) < options_.grow) map_.index.pixels[p] = f;
-      }
     }
   }
 

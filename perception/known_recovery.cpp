@@ -12,7 +12,7 @@ namespace dofusion {
 namespace {
 
 constexpr int kWindowMargin = 24;         // pixels around a cluster: free space that must stay free
-constexpr double kCoarsePixels = 350.0;   // of an object on the coarse level
+constexpr double kCoarsePixels = 100.0;   // of the library's smallest object on the coarse level, about
 
 SceneSearchOptions search_options(const KnownRecoveryOptions& options) {
   SceneSearchOptions search;
@@ -90,7 +90,7 @@ int coarse_stride(const std::vector<ObjectModel>& models, const Camera& camera,
   double volume = models.front().object->volume;
   for (const ObjectModel& model : models) volume = std::min(volume, model.object->volume);
   const double side_px = std::cbrt(volume) * camera.fx / z;
-  return std::clamp(static_cast<int>(std::lround(side_px / std::sqrt(kCoarsePixels / 1.5))), 1, 8);
+  return std::clamp(static_cast<int>(std::lround(side_px / std::sqrt(kCoarsePixels))), 1, 8);
 }
 
 FaceMap object_faces(const DepthImage& depth, const Camera& camera, const LabelImage& labels,
@@ -115,10 +115,26 @@ int common_label(const Cluster& cluster, const RasterPatch& patch) {
   return static_cast<int>(std::max_element(votes.begin(), votes.end()) - votes.begin());
 }
 
+// Share of a label's readings that the scene explains to 3 sigma. Blocks can fill a part of a foreign object without
+// contradicting any reading; what they leave gives them away.
+double explained_share(const Observation& seen, const Explanation& scene, int label) {
+  int readings = 0, explained = 0;
+  for (std::size_t i = 0; i < seen.labels.pixels.size(); ++i) {
+    if (seen.labels.pixels[i] != label || seen.depth.pixels[i] <= 0.0f) continue;
+    ++readings;
+    explained += scene.cost.pixels[i] < 4.5f;
+  }
+  return explained / std::max(1.0, 0.0 + readings);
+}
+
 // The recovered objects of a cluster's scene, those that explain too little left out.
 std::vector<RecoveredObject> report(const std::vector<ObjectModel>& models, const Cluster& cluster,
                                     const std::vector<PlacedObject>& objects, double min_score) {
   PoseScorer scorer(cluster.pyramid.fine);
+  Explanation scene = scorer.empty_scene();
+  for (const PlacedObject& object : objects) {
+    scorer.add(models[object.model].object->mesh, object.T_world_object, scene);
+  }
   std::vector<RecoveredObject> result;
   for (std::size_t i = 0; i < objects.size(); ++i) {
     Explanation others = scorer.empty_scene();
@@ -133,9 +149,10 @@ std::vector<RecoveredObject> report(const std::vector<ObjectModel>& models, cons
     object.name = model.object->name;
     object.known = true;
     object.pixels = counts.explained;
-    object.score = counts.explained / std::max(1.0, 0.0 + counts.explained + counts.nearer + counts.behind);
-    if (object.score < min_score) continue;
     object.label = common_label(cluster, scorer.render(model.object->mesh, object.T_world_object));
+    object.score = counts.explained / std::max(1.0, 0.0 + counts.explained + counts.nearer + counts.behind);
+    if (object.label > 0) object.score *= explained_share(cluster.pyramid.fine, scene, object.label);
+    if (object.score < min_score) continue;
     result.push_back(object);
   }
   return result;

@@ -14,7 +14,7 @@ struct KnownRecoveryOptions {
   double cluster_distance = 0.05; // metres between readings of objects that are searched for jointly
   int beam = 3;                   // partial scenes of a cluster that are kept
   int fewest_pixels = 40;         // that an object must show
-  double min_score = 0.6;         // share of its visible pixels that an object must explain to be believed
+  double min_score = 0.75;        // an object that explains less is not believed
   bool settle = true;             // let the recovered scene come to rest in physics
   double settle_distance = 0.006; // metres, and
   double settle_angle = 0.1;      // radians that settling may move an object; else its seen pose is kept
@@ -24,9 +24,10 @@ struct KnownRecoveryOptions {
 // the faces seen and from the ways objects rest, rendered and compared, aligned to the readings, and chosen jointly
 // for objects that touch or hide each other, so that one label may hold several objects and several labels one. The
 // scene is then settled in physics: objects lie exactly on what supports them. What no object of the library explains
-// is left out, with its label unused. The result is sorted by label, then by pixels; `pixels` counts the
-// readings the object explains and `score` is their share of the visible pixels with a reading. An empty list if
-// there is no label above 1. Throws std::invalid_argument if an image is not of the camera's size or the library is
+// is left out, with its label unused. The result is sorted by label, then by pixels. `pixels` counts the readings that
+// the object explains to 3 sigma; `score` is their share of the readings where the object is in view, times the
+// share of its label's readings that the whole scene explains; `label` is 0 for an object that the segmentation has
+// missed. An empty list if there is no label above 1. Throws std::invalid_argument if an image is not of the camera's size or the library is
 // empty.
 std::vector<RecoveredObject> recover_known(const DepthImage& depth, const Camera& camera, const Table& table,
                                            const LabelImage& labels, const std::vector<ObjectPtr>& library,

@@ -16,7 +16,7 @@ Pose on_table(Rng& rng, double z) {
 SceneDataset boxes_on_table(int count, std::uint64_t seed) {
   SceneDataset dataset;
   dataset.settings = "{}";
-  dataset.shapes = {{"box", box_mesh({0.06, 0.10, 0.04})}};
+  dataset.shapes = {{"box", box_mesh({0.06, 0.10, 0.04}), nullptr}};
   Rng rng = make_rng(seed);
   for (int i = 0; i < count; ++i) {
     SceneRecord record;
@@ -32,7 +32,7 @@ SceneDataset boxes_on_table(int count, std::uint64_t seed) {
 SceneDataset stacked_cubes(int count, std::uint64_t seed) {
   SceneDataset dataset;
   dataset.settings = "{}";
-  dataset.shapes = {{"cube", block_mesh("cube")}};
+  dataset.shapes = {{"cube", block_mesh("cube"), nullptr}};
   Rng rng = make_rng(seed);
   for (int i = 0; i < count; ++i) {
     SceneRecord record;
