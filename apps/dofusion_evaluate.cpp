@@ -5,6 +5,9 @@
 #include "apps/assets.h"
 #include "apps/evaluation.h"
 #include "apps/program.h"
+#ifdef DOFUSION_TORCH
+#include "diffusion/torch_network.h"
+#endif
 #include "stability/files.h"
 
 using namespace dofusion;
@@ -32,11 +35,14 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--steps", sampler.steps, "reverse steps of the sampler")->check(CLI::Range(1, 10000))->capture_default_str();
   app.add_option("--points", sampler.points, "points of a scene's cloud; 0: as in training")->capture_default_str();
-  app.add_option("--seed", seed, "of scenes and samples")->capture_default_str();
+  app.add_option("--seed", seed, "of scenes and samples")->check(CLI::NonNegativeNumber)->capture_default_str();
   app.add_option("--threads", sampler.threads)->check(CLI::Range(1, 1024))->capture_default_str();
   app.add_option("--json", json_path, "write the rows to this file");
 
   return run_program(app, argc, argv, [&] {
+#ifdef DOFUSION_TORCH
+    enable_torch_networks(sampler.threads);  // for models of the paper's preset
+#endif
     const PlacementModel model = PlacementModel::load(model_path.empty() ? default_model_path() : model_path);
     InstanceOptions options;
     options.seed = seed;

@@ -45,6 +45,7 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--count", count, "scenes")->check(CLI::Range(1, 100'000'000))->capture_default_str();
   app.add_option("--seed", options.seed, "the same seed gives the same scenes on any number of threads")
+      ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   app.add_option("--threads", threads)->check(CLI::Range(1, 1024))->capture_default_str();
   app.add_option("--out", out, "the dataset, HDF5; after a kill the same command goes on from FILE.partial")->required();

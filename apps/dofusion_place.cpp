@@ -36,7 +36,7 @@ int main(int argc, char** argv) {
   app.add_option("--steps", arguments.placement.steps, "reverse steps of the sampler")->check(CLI::Range(1, 10000))->capture_default_str();
   app.add_flag("--raw", raw, "keep the model's poses; otherwise a stable one is replaced by where it came to rest");
   app.add_option("--model", arguments.model, "a model file; default: the shipped one");
-  app.add_option("--seed", arguments.placement.seed)->capture_default_str();
+  app.add_option("--seed", arguments.placement.seed)->check(CLI::NonNegativeNumber)->capture_default_str();
   app.add_option("--threads", arguments.placement.threads)->check(CLI::Range(1, 1024))->capture_default_str();
   app.add_option("--json", json, "write placements.json here as well");
   app.add_option("--out", out, "folder for placements.json, scene.xml, report.html, …")->required();
@@ -45,17 +45,18 @@ int main(int argc, char** argv) {
     if (arguments.depth.empty() == arguments.cloud.empty()) throw InputError("give --depth or --cloud; see --help");
     arguments.placement.polish = !raw;
     Stopwatch watch;
+    if (out.empty()) throw InputError("--out: the name of a folder is needed");
     OutputDirectory output(out);  // an --out that cannot be written fails before the work
     const PlaceInputs inputs = load_inputs(arguments);
-    if (!inputs.query->convex) {
-      std::fprintf(stderr, "note: %s is not convex; physics takes its convex hull\n", inputs.query->name.c_str());
-    }
     const double load_ms = watch.lap_ms();
     PlaceResult result = run_placement(inputs, arguments);
     result.timing_ms.insert(result.timing_ms.begin(), {"load", load_ms});
     write_outputs(output.path().string(), inputs, arguments, result);
-    output.commit();
     if (!json.empty()) write_file(json, placements_json(inputs, arguments, result));
+    output.commit();
+    if (!inputs.query->convex) {
+      std::fprintf(stderr, "note: %s is not convex; physics takes its convex hull\n", inputs.query->name.c_str());
+    }
     std::printf("%s\nreport: %s/report.html\n", summary_line(inputs, result).c_str(), out.c_str());
   });
 }

@@ -100,7 +100,7 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(16, 8192))
       ->capture_default_str();
   app.add_option("--split", split, "name of the folder of scenes")->capture_default_str();
-  app.add_option("--seed", seed, "the same seed gives the same scans on any number of threads")->capture_default_str();
+  app.add_option("--seed", seed, "the same seed gives the same scans on any number of threads")->check(CLI::NonNegativeNumber)->capture_default_str();
   app.add_option("--threads", threads)->check(CLI::Range(1, 1024))->capture_default_str();
   app.add_option("--json", json, "write what was done to this file");
   app.add_option("--out", out, "the dataset's folder")->required();

@@ -55,7 +55,7 @@ int main(int argc, char** argv) {
   app.add_option("--warm-up", options.warm_up, "steps of rising learning rate")
       ->check(CLI::Range(0, 1'000'000))
       ->capture_default_str();
-  app.add_option("--seed", options.seed)->capture_default_str();
+  app.add_option("--seed", options.seed)->check(CLI::NonNegativeNumber)->capture_default_str();
   app.add_option("--threads", options.threads)->check(CLI::Range(1, 1024))->capture_default_str();
   app.add_option("--report-seconds", options.report_seconds, "between progress lines")
       ->check(CLI::Range(0.0, 1e6))
@@ -63,6 +63,9 @@ int main(int argc, char** argv) {
   app.add_option("--json", json_path, "write the result here");
 
   return run_program(app, argc, argv, [&] {
+    if (!options.resume && std::filesystem::exists(options.out)) {
+      throw InputError(options.out + ": exists already; --resume goes on with its training, another --out begins anew");
+    }
     ModelConfig config = make_config(preset_from_string(preset));
     if (!config_path.empty()) config = config_from_json(read_file(config_path), config_path, config);
 #ifdef DOFUSION_TORCH

@@ -8,6 +8,7 @@
 
 #include "apps/assets.h"
 #include "apps/place_report.h"
+#include "apps/program.h"
 #include "apps/stopwatch.h"
 #include "perception/cloud_io.h"
 #include "perception/depth_io.h"
@@ -21,19 +22,39 @@ namespace dofusion {
 namespace fs = std::filesystem;
 namespace {
 
+constexpr double kSmallest = 1e-3, kLargest = 10.0;  // metres, diameter; beyond, a unit is wrong
+
+// The solid of a mesh file; `unit_option` is the argument that says its unit.
+ObjectAndOffset load_solid(const std::string& file, double unit, const std::string& unit_option) {
+  ObjectAndOffset solid;
+  try {
+    solid = make_object(fs::path(file).stem().string(), read_solid_mesh(file, unit));
+  } catch (const std::invalid_argument& e) {
+    throw InputError(file + ": " + e.what());
+  }
+  if (solid.object->diameter < kSmallest || solid.object->diameter > kLargest) {
+    char metres[32];
+    std::snprintf(metres, sizeof metres, "%.3g", solid.object->diameter);
+    throw InputError(file + ": the object measures " + metres + " m; give the unit of its coordinates with " + unit_option);
+  }
+  return solid;
+}
+
 std::vector<ObjectPtr> load_library(const std::string& directory, double unit) {
   if (!fs::is_directory(directory)) throw InputError(directory + ": --objects needs a folder of mesh files");
   std::vector<fs::path> files;
-  for (const fs::directory_entry& entry : fs::directory_iterator(directory)) {
-    std::string extension = entry.path().extension().string();
+  std::error_code error;
+  for (fs::directory_iterator entry(directory, error), end; !error && entry != end; entry.increment(error)) {
+    std::string extension = entry->path().extension().string();
     std::transform(extension.begin(), extension.end(), extension.begin(), ::tolower);
-    if (extension == ".obj" || extension == ".stl" || extension == ".ply") files.push_back(entry.path());
+    if (extension == ".obj" || extension == ".stl" || extension == ".ply") files.push_back(entry->path());
   }
+  if (error) throw InputError(directory + ": cannot be listed (" + error.message() + ")");
   std::sort(files.begin(), files.end());
   if (files.empty()) throw InputError(directory + ": no .obj, .stl or .ply file in it");
   std::vector<ObjectPtr> library;
   for (const fs::path& file : files) {
-    library.push_back(make_object(file.stem().string(), read_solid_mesh(file.string(), unit)).object);
+    library.push_back(load_solid(file.string(), unit, "--objects-unit").object);
   }
   return library;
 }
@@ -80,11 +101,7 @@ ObjectAndOffset load_query(const std::string& name_or_file, double unit) {
     for (const std::string& name : names) known += (known.empty() ? "" : ", ") + name;
     throw InputError("--query " + name_or_file + ": neither a mesh file nor a block (" + known + ")");
   }
-  try {
-    return make_object(fs::path(name_or_file).stem().string(), read_solid_mesh(name_or_file, unit));
-  } catch (const std::invalid_argument& e) {
-    throw InputError(name_or_file + ": " + e.what());
-  }
+  return load_solid(name_or_file, unit, "--query-unit");
 }
 
 PlaceInputs load_inputs(const PlaceArguments& arguments) {
@@ -101,6 +118,24 @@ PlaceInputs load_inputs(const PlaceArguments& arguments) {
   if (!arguments.objects.empty()) inputs.library = load_library(arguments.objects, arguments.objects_unit);
   return inputs;
 }
+
+namespace {
+
+// A few at a time, between which a signal is seen.
+std::vector<Pose> sample_interruptibly(const PlacementModel& model, const std::vector<PlacementProblem>& problems,
+                                       const SamplerOptions& options) {
+  constexpr std::size_t kAtOnce = 64;
+  std::vector<Pose> poses;
+  for (std::size_t first = 0; first < problems.size(); first += kAtOnce) {
+    if (interrupted()) throw Interrupted("interrupted");
+    const auto begin = problems.begin() + static_cast<std::ptrdiff_t>(first);
+    const std::vector<PlacementProblem> some(begin, begin + static_cast<std::ptrdiff_t>(std::min(kAtOnce, problems.size() - first)));
+    for (const Pose& pose : model.sample(some, options)) poses.push_back(pose);
+  }
+  return poses;
+}
+
+}  // namespace
 
 PlaceResult run_placement(const PlaceInputs& inputs, const PlaceArguments& arguments) {
   PlaceResult result;
@@ -125,8 +160,10 @@ PlaceResult run_placement(const PlaceInputs& inputs, const PlaceArguments& argum
   SamplerOptions sampler;
   sampler.steps = arguments.placement.steps;
   sampler.threads = arguments.placement.threads;
-  const std::vector<Pose> candidates = model.sample(placement_problems(scene, query, arguments.placement), sampler);
+  const std::vector<Pose> candidates =
+      sample_interruptibly(model, placement_problems(scene, query, arguments.placement), sampler);
   result.timing_ms.emplace_back("sample", watch.lap_ms());
+  if (interrupted()) throw Interrupted("interrupted");
   result.placements = check_placements(scene, query, candidates, arguments.placement);
   result.timing_ms.emplace_back("settle", watch.lap_ms());
   return result;
@@ -172,7 +209,8 @@ std::string placements_json(const PlaceInputs& inputs, const PlaceArguments& arg
          {"penetration_m", placement.penetration}});
   }
   for (const auto& [step, ms] : result.timing_ms) json["timing_ms"][step] = std::round(ms * 10.0) / 10.0;
-  return json.dump(1) + "\n";
+  // A file's name need not be UTF-8; JSON must.
+  return json.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
 void write_outputs(const std::string& directory, const PlaceInputs& inputs, const PlaceArguments& arguments,
@@ -197,16 +235,16 @@ void write_outputs(const std::string& directory, const PlaceInputs& inputs, cons
 }
 
 std::string summary_line(const PlaceInputs& inputs, const PlaceResult& result) {
-  char line[256];
   if (!result.recovered.table) return "no table was found in the image, so there is nothing to place on";
   const auto stable = std::count_if(result.placements.begin(), result.placements.end(),
                                     [](const Placement& p) { return p.stable; });
   const std::size_t n = result.recovered.objects.size();
-  std::snprintf(line, sizeof line, "%zu object%s recovered; %ld of %zu placements of the %s are stable", n,
-                n == 1 ? "" : "s", static_cast<long>(stable), result.placements.size(), inputs.query->name.c_str());
-  std::string text = line;
+  std::string text = n == 0 ? "no object was found on the table" : std::to_string(n) + (n == 1 ? " object" : " objects") + " recovered";
+  text += "; " + std::to_string(stable) + " of " + std::to_string(result.placements.size()) + " placements of the " +
+          inputs.query->name + " are stable";
   if (stable > 0) {
     const Displacement& best = result.placements.front().displacement;
+    char line[96];
     std::snprintf(line, sizeof line, ", the best moves %.2f %% and %.2f degrees", best.translation_pct, best.rotation_deg);
     text += line;
   }

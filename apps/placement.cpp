@@ -109,11 +109,12 @@ std::vector<PlacementProblem> placement_problems(const Scene& scene, const Objec
 std::vector<Placement> check_placements(const Scene& scene, const ObjectPtr& query, const std::vector<Pose>& candidates,
                                         const PlacementOptions& options) {
   std::vector<std::unique_ptr<Checker>> checkers;
-  for (int t = 0; t < options.threads; ++t) {
+  const int threads = std::max(1, std::min(options.threads, static_cast<int>(candidates.size())));
+  for (int t = 0; t < threads; ++t) {
     checkers.push_back(std::make_unique<Checker>(scene, query, options.physics));
   }
   std::vector<Placement> placements(candidates.size());
-  parallel_for(static_cast<std::int64_t>(candidates.size()), options.threads, [&](std::int64_t i, int thread) {
+  parallel_for(static_cast<std::int64_t>(candidates.size()), threads, [&](std::int64_t i, int thread) {
     const Checker& checker = *checkers[static_cast<std::size_t>(thread)];
     Placement& placement = placements[static_cast<std::size_t>(i)];
     placement = checker.check(candidates[static_cast<std::size_t>(i)]);
@@ -125,7 +126,7 @@ std::vector<Placement> check_placements(const Scene& scene, const ObjectPtr& que
 
   std::stable_sort(placements.begin(), placements.end(), moves_less);
   const std::size_t tried = std::min(placements.size(), static_cast<std::size_t>(std::max(options.tried, 0)));
-  parallel_for(static_cast<std::int64_t>(tried), options.threads, [&](std::int64_t i, int thread) {
+  parallel_for(static_cast<std::int64_t>(tried), threads, [&](std::int64_t i, int thread) {
     Placement& placement = placements[static_cast<std::size_t>(i)];
     if (!placement.stable || options.trials <= 0) return;
     Rng rng = make_rng(options.seed ^ 0x7261696c73ull, static_cast<std::uint64_t>(i));

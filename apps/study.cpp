@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+
 #include <nlohmann/json.hpp>
 
 #include "apps/assets.h"
@@ -80,9 +81,9 @@ void measure_recovery(const Scene& truth, const Scene& recovered, bool known, St
   for (const Match& m : matches) {
     const Object& object = *truth.objects[m.truth];
     const bool same_shape = known && recovered.objects[m.recovered]->name == object.name;
-    const double error = same_shape ? corner_distance(object, truth.T_world_object[m.truth],
-                                                      recovered.T_world_object[m.recovered])
-                                    : m.distance;
+    const double error =
+        same_shape ? corner_distance(object, truth.T_world_object[m.truth], recovered.T_world_object[m.recovered])
+                   : m.distance;
     if (same_shape) ++*row.shapes_right;
     worst_pct = std::max(worst_pct, 100.0 * error / object.diameter);
     sum += m.distance;
@@ -136,6 +137,32 @@ std::string hash_of(const std::string& bytes) {
 }
 
 std::string model_path(const StudyConfig& config) { return config.model.empty() ? default_model_path() : config.model; }
+
+using Runners = std::vector<std::unique_ptr<StudyRunner>>;
+
+// A scene at all its noise scales is one piece of work: its references are needed once.
+void run_missing_trials(const StudyJob& job, const Runners& runners, PartialRows& rows) {
+  const auto scales = static_cast<std::int64_t>(job.config.noise_scales.size());
+  const std::int64_t scenes = (job.trials + scales - 1) / scales;
+  Progress progress("trials", job.trials, rows.count(job.trials));
+  parallel_for(scenes, static_cast<int>(runners.size()), [&](std::int64_t index, int thread) {
+    const std::int64_t end = std::min((index + 1) * scales, job.trials);
+    std::vector<std::int64_t> missing;
+    for (std::int64_t trial = index * scales; trial < end; ++trial) {
+      if (!rows.has(trial)) missing.push_back(trial);
+    }
+    if (missing.empty()) return;
+    stop_if_interrupted();
+    StudyRunner& runner = *runners[static_cast<std::size_t>(thread)];
+    const StudyScene scene = runner.make_scene(index);
+    const StudyRow reference = runner.reference_row(scene);
+    for (const std::int64_t trial : missing) {
+      stop_if_interrupted();
+      rows.add(runner.run(scene, trial, reference));
+      progress.update(rows.count(job.trials));
+    }
+  });
+}
 
 }  // namespace
 
@@ -288,7 +315,7 @@ std::string study_settings(const StudyJob& job) {
 std::vector<StudyRow> run_study(const StudyJob& job) {
   const PlacementModel model = PlacementModel::load(model_path(job.config));
   const std::vector<ObjectPtr> library = load_block_library();
-  std::vector<std::unique_ptr<StudyRunner>> runners;
+  Runners runners;
   for (int t = 0; t < job.threads; ++t) {
     runners.push_back(std::make_unique<StudyRunner>(job.config, job.seed, model, library));
   }
@@ -298,27 +325,12 @@ std::vector<StudyRow> run_study(const StudyJob& job) {
     std::fprintf(stderr, "continuing with the %ld trials of %s\n", static_cast<long>(before), job.partial.c_str());
   }
 
-  // A scene at all its noise scales is one piece of work: its references are needed once.
-  const auto scales = static_cast<std::int64_t>(job.config.noise_scales.size());
-  const std::int64_t scenes = (job.trials + scales - 1) / scales;
-  Progress progress("trials", job.trials, before);
-  parallel_for(scenes, job.threads, [&](std::int64_t index, int thread) {
-    const std::int64_t end = std::min((index + 1) * scales, job.trials);
-    std::vector<std::int64_t> missing;
-    for (std::int64_t trial = index * scales; trial < end; ++trial) {
-      if (!rows.has(trial)) missing.push_back(trial);
-    }
-    if (missing.empty()) return;
-    stop_if_interrupted();
-    StudyRunner& runner = *runners[static_cast<std::size_t>(thread)];
-    const StudyScene scene = runner.make_scene(index);
-    const StudyRow reference = runner.reference_row(scene);
-    for (const std::int64_t trial : missing) {
-      stop_if_interrupted();
-      rows.add(runner.run(scene, trial, reference));
-      progress.update(rows.count(job.trials));
-    }
-  });
+  try {
+    run_missing_trials(job, runners, rows);
+  } catch (const Interrupted&) {
+    throw Interrupted("interrupted after " + std::to_string(rows.count(job.trials)) + " of " +
+                      std::to_string(job.trials) + " trials; the same command goes on from " + job.partial);
+  }
   return rows.rows(job.trials);
 }
 

@@ -17,7 +17,7 @@ namespace dofusion {
 struct StudyScene {
   std::int64_t index = 0;
   Task task = Task::kSingle;
-  Scene truth;      // without the query
+  Scene truth;  // without the query
   ObjectPtr query;
 };
 

@@ -2,8 +2,9 @@
 
 #include <filesystem>
 #include <functional>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
+
+#include <nlohmann/json.hpp>
 
 #include "stability/files.h"
 
@@ -21,8 +22,9 @@ class Fields {
 
   // Sets `value` if the field is there; `wanted` describes the type, `valid` the range.
   template <class T>
-  void take(const char* name, T& value, const std::string& wanted,
-            const std::function<bool(const T&)>& valid = [](const T&) { return true; }) {
+  void take(
+      const char* name, T& value, const std::string& wanted,
+      const std::function<bool(const T&)>& valid = [](const T&) { return true; }) {
     const auto field = object_.find(name);
     if (field == object_.end()) return;
     if (!is_a<T>(*field)) fail(name, wanted, *field);
@@ -58,7 +60,8 @@ class Fields {
     if constexpr (std::is_same_v<T, bool>) return field.is_boolean();
     if constexpr (std::is_same_v<T, int>) return field.is_number_integer();
     if constexpr (std::is_same_v<T, double>) return field.is_number();
-    if constexpr (std::is_same_v<T, std::string>) return field.is_string() && !field.get_ref<const std::string&>().empty();
+    if constexpr (std::is_same_v<T, std::string>)
+      return field.is_string() && !field.get_ref<const std::string&>().empty();
     if constexpr (std::is_same_v<T, json>) return true;
     if constexpr (std::is_same_v<T, std::vector<double>>) {
       if (!field.is_array()) return false;
@@ -111,8 +114,8 @@ StudyConfig study_config_from_json(const std::string& text, const std::string& s
   StudyConfig config;
   Fields fields(object, source, "");
   fields.take_name<SensorModel>("sensor", config.sensor, sensor_from_string);
-  fields.take<std::vector<double>>("noise_scales", config.noise_scales,
-                                   "a list of ascending numbers between 0 and 100", are_noise_scales);
+  fields.take<std::vector<double>>("noise_scales", config.noise_scales, "a list of ascending numbers between 0 and 100",
+                                   are_noise_scales);
   fields.take<double>("distance_m", config.distance_m, "a number between 0.1 and 10",
                       [](const double& d) { return d >= 0.1 && d <= 10.0; });
   fields.take<bool>("known", config.known, "true or false");

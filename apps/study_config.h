@@ -1,9 +1,10 @@
 // What dofusion-study varies and keeps fixed; a JSON file in which every field is optional.
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
+
+#include <nlohmann/json_fwd.hpp>
 
 #include "perception/sensor_noise.h"
 #include "stability/dataset.h"
@@ -22,9 +23,9 @@ struct StudyConfig {
   double distance_m = 0.7;                                  // from the camera to the scene's centre
   bool known = true;  // the objects are among the shipped blocks; false: nothing is known of them
   std::vector<StudyTask> tasks = {{Task::kSingle, 1}, {Task::kUnstructured, 2}};  // scene i has task i mod size
-  int samples = 8;    // candidates of a placement
-  int steps = 50;     // of the sampler
-  std::string model;  // file; empty: the shipped one
+  int samples = 8;                                                                // candidates of a placement
+  int steps = 50;                                                                 // of the sampler
+  std::string model;                                                              // file; empty: the shipped one
 };
 
 // Reads the file; a relative `model` is relative to the file's folder. Throws InputError naming the file and the

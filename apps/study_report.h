@@ -12,13 +12,6 @@ namespace dofusion {
 
 std::string trials_csv(const std::vector<StudyRow>& rows);
 
-// Median displacement against noise in the recovered and in the true scene, with 95 % bands and the two references:
-// translation on the left, rotation on the right.
-std::string displacement_svg(const StudySummary& summary, const StudyConfig& config);
-
-// The share of placements that stand, and what failed first in the others.
-std::string success_svg(const StudySummary& summary, const StudyConfig& config);
-
 // One page with both figures, the summary as tables, and what was done; opens without a network.
 std::string study_html(const StudySummary& summary, const StudyConfig& config, std::uint64_t seed);
 

@@ -86,8 +86,10 @@ bool parse(const std::string& text, std::optional<T>& value) {
 std::vector<std::string> split(const std::string& line) {
   std::vector<std::string> cells(1);
   for (const char c : line) {
-    if (c == ',') cells.emplace_back();
-    else cells.back() += c;
+    if (c == ',')
+      cells.emplace_back();
+    else
+      cells.back() += c;
   }
   return cells;
 }
@@ -100,10 +102,12 @@ std::map<std::int64_t, StudyRow> read_partial(const std::string& path, const std
     if (lines.eof()) break;  // no line end: the writer was killed within this line
     if (number == 1) {
       if (line != "# " + settings) {
-        throw InputError(path + ": left by a study with other settings or another model; delete it or choose another --out");
+        throw InputError(path +
+                         ": left by a study with other settings or another model; delete it or choose another --out");
       }
     } else if (number == 2) {
-      if (line + "\n" != csv_header()) throw InputError(path + ": line 2 is not this program's header; delete the file");
+      if (line + "\n" != csv_header())
+        throw InputError(path + ": line 2 is not this program's header; delete the file");
     } else {
       const std::optional<StudyRow> row = row_from_csv_line(line);
       if (!row) throw InputError(path + ": line " + std::to_string(number) + " is damaged; delete that line");
@@ -132,7 +136,8 @@ std::string first_failure(const StudyRow& row) {
 std::string csv_header() {
   std::string header;
   const StudyRow row;
-  for_each_column(row, [&](const char* name, const auto&) { header += (header.empty() ? "" : ",") + std::string(name); });
+  for_each_column(row,
+                  [&](const char* name, const auto&) { header += (header.empty() ? "" : ",") + std::string(name); });
   return header + "\n";
 }
 

@@ -24,9 +24,9 @@ struct StudyRow {
   std::string context;  // the blocks on the table, "cube+hat"
   std::string query;    // the block to place
   int objects_true = 0;
-  std::int64_t fewest_pixels = 0;    // that an object of the true scene shows
+  std::int64_t fewest_pixels = 0;  // that an object of the true scene shows
   std::optional<int> objects_found;
-  std::optional<int> shapes_right;   // of the matched objects; known objects only
+  std::optional<int> shapes_right;  // of the matched objects; known objects only
   // Recovered objects are matched with the nearest true ones, in the frame of the camera.
   std::optional<double> position_error_mean_mm, position_error_max_mm;  // between centres of mass
   // The worst matched object's error, of its diameter. Same shape: the largest distance from a corner to the nearest
@@ -57,7 +57,7 @@ struct StudyRow {
 //   pose          an object is off by more than kPoseErrorPct of its diameter
 //   placement     none of these: the scene was recovered well and still nothing stands
 std::string first_failure(const StudyRow& row);
-inline constexpr double kPoseErrorPct = 5.0;  // half of what a stable object may move
+inline constexpr double kPoseErrorPct = 5.0;      // half of what a stable object may move
 const std::vector<std::string>& failure_names();  // in the order above
 
 // CSV with six significant digits; booleans are 0 and 1. Lines end in "\n".
@@ -77,7 +77,7 @@ class PartialRows {
   void add(const StudyRow& row);
 
   bool has(std::int64_t trial) const;
-  std::int64_t count(std::int64_t trials) const;         // rows of trials below `trials`
+  std::int64_t count(std::int64_t trials) const;          // rows of trials below `trials`
   std::vector<StudyRow> rows(std::int64_t trials) const;  // of trials below `trials`, by trial
 
  private:

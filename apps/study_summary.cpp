@@ -2,9 +2,10 @@
 
 #include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <numeric>
 #include <set>
+
+#include <nlohmann/json.hpp>
 
 #include "stability/random.h"
 
@@ -56,8 +57,10 @@ std::vector<double> values_of(const Rows& rows, const Quantity& quantity) {
   std::vector<double> values;
   for (const StudyRow& row : rows) {
     const std::optional<double> value = quantity.value(row);
-    if (value) values.push_back(*value);
-    else if (quantity.missing_is_infinite) values.push_back(std::numeric_limits<double>::infinity());
+    if (value)
+      values.push_back(*value);
+    else if (quantity.missing_is_infinite)
+      values.push_back(std::numeric_limits<double>::infinity());
   }
   return values;
 }
@@ -118,9 +121,8 @@ nlohmann::ordered_json to_json(const StudyReference& reference) {
 }
 
 nlohmann::ordered_json to_json(const StudyPoint& point) {
-  nlohmann::ordered_json json = {{"noise_scale", point.noise_scale},
-                                 {"depth_sigma_mm", point.depth_sigma_mm},
-                                 {"trials", point.trials}};
+  nlohmann::ordered_json json = {
+      {"noise_scale", point.noise_scale}, {"depth_sigma_mm", point.depth_sigma_mm}, {"trials", point.trials}};
   for (const Quantity& q : medians()) json[q.name] = to_json(point.medians.at(q.name), "median");
   for (const Quantity& q : shares()) json[q.name] = to_json(point.shares.at(q.name), "share");
   for (const std::string& failure : failure_names()) json["failures"][failure] = point.failures.at(failure);

@@ -11,7 +11,7 @@ namespace dofusion {
 namespace {
 
 constexpr double kWidth = 960.0, kLegendRow = 22.0, kTop = 12.0, kTitle = 26.0, kPlotHeight = 300.0;
-constexpr double kLeftMargin = 66.0, kRightMargin = 14.0, kBottomMargin = 64.0, kCaptionRow = 18.0;
+constexpr double kLeftMargin = 76.0, kRightMargin = 14.0, kBottomMargin = 64.0, kCaptionRow = 18.0;
 constexpr double kAside = 8.0;  // between the curves of a panel
 constexpr const char* kInk = "#222222";
 constexpr const char* kGrid = "#dddddd";
@@ -42,7 +42,8 @@ std::string stroke(const std::string& colour, double width, const std::string& d
 std::string marker(Marker shape, double x, double y, const std::string& colour) {
   const std::string fill = "fill=\"" + colour + "\" stroke=\"white\" stroke-width=\"1\"/>\n";
   switch (shape) {
-    case Marker::kCircle: return format("<circle cx=\"%.1f\" cy=\"%.1f\" r=\"5\" ", x, y) + fill;
+    case Marker::kCircle:
+      return format("<circle cx=\"%.1f\" cy=\"%.1f\" r=\"5\" ", x, y) + fill;
     case Marker::kSquare:
       return format("<rect x=\"%.1f\" y=\"%.1f\" width=\"9\" height=\"9\" ", x - 4.5, y - 4.5) + fill;
     case Marker::kDiamond:
@@ -81,7 +82,7 @@ std::string draw_axes(const Frame& f) {
   svg += line(f.left, f.bottom, f.right, f.bottom, stroke(kInk, 1.2));
   svg += line(f.left, f.top, f.left, f.bottom, stroke(kInk, 1.2));
   svg += text((f.left + f.right) / 2.0, f.bottom + 55.0, f.panel.x.title, "middle");
-  const double x = f.left - 50.0, y = (f.top + f.bottom) / 2.0;
+  const double x = f.left - 60.0, y = (f.top + f.bottom) / 2.0;
   svg += text(x, y, f.panel.y.title, "middle", format("transform=\"rotate(-90 %.1f %.1f)\"", x, y).c_str());
   svg += text(f.left, f.top - 10.0, f.panel.title, "start", "class=\"title\"");
   return svg;
@@ -106,8 +107,10 @@ std::string draw_limit(const Frame& f, const PlotLimit& limit) {
 std::vector<std::vector<PlotPoint>> unbroken(const std::vector<PlotPoint>& points) {
   std::vector<std::vector<PlotPoint>> runs(1);
   for (const PlotPoint& p : points) {
-    if (std::isfinite(p.y)) runs.back().push_back(p);
-    else if (!runs.back().empty()) runs.emplace_back();
+    if (std::isfinite(p.y))
+      runs.back().push_back(p);
+    else if (!runs.back().empty())
+      runs.emplace_back();
   }
   return runs;
 }
@@ -118,7 +121,8 @@ std::string draw_band(const Frame& f, const PlotCurve& curve, double aside) {
   for (const auto& run : unbroken(curve.points)) {
     if (run.empty()) continue;
     std::string corners;
-    for (const PlotPoint& p : run) corners += format("%.1f,%.1f ", f.x(p.x) + aside, f.y(std::isnan(p.high) ? p.y : p.high));
+    for (const PlotPoint& p : run)
+      corners += format("%.1f,%.1f ", f.x(p.x) + aside, f.y(std::isnan(p.high) ? p.y : p.high));
     for (auto p = run.rbegin(); p != run.rend(); ++p)
       corners += format("%.1f,%.1f ", f.x(p->x) + aside, f.y(std::isnan(p->low) ? p->y : p->low));
     svg += "<polygon points=\"" + corners + "\" fill=\"" + curve.colour + "\" opacity=\"0.20\"/>\n";
@@ -140,8 +144,10 @@ std::string draw_curve(const Frame& f, const PlotCurve& curve, double aside) {
 }
 
 std::string swatch(const PlotPart& part, double x, double y, double width, double height) {
-  std::string svg = format("<rect x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\" fill=\"%s\" stroke=\"white\" "
-                           "stroke-width=\"1\"/>\n", x, y, width, height, part.colour.c_str());
+  std::string svg = format(
+      "<rect x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\" fill=\"%s\" stroke=\"white\" "
+      "stroke-width=\"1\"/>\n",
+      x, y, width, height, part.colour.c_str());
   if (part.hatched) {
     svg += format("<rect x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\" fill=\"url(#hatch)\"/>\n", x, y, width,
                   height);
@@ -225,7 +231,7 @@ std::string draw_legend(const std::vector<PlotPanel>& panels, double& height) {
 PlotAxis log_axis(const std::string& title, double low, double high) {
   PlotAxis axis{title, 0.6 * low, high, true, {}, low};
   for (double at = low; at < high * 1.001; at *= 10.0) {
-    axis.ticks.push_back({at, (axis.ticks.empty() ? "≤ " : "") + format("%g", at), ""});
+    axis.ticks.push_back({at, (axis.ticks.empty() ? "≤" : "") + format("%g", at), ""});
   }
   return axis;
 }
@@ -238,12 +244,13 @@ std::string draw_figure(const std::vector<PlotPanel>& panels, const std::vector<
   const double height = caption_top + kCaptionRow * static_cast<double>(caption.size());
   std::string svg = format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %.0f %.0f\" width=\"%.0f\" height=\"%.0f\" "
-      "font-family=\"DejaVu Sans, Verdana, Arial, sans-serif\" font-size=\"13\" fill=\"%s\">\n", kWidth, height,
-      kWidth, height, kInk);
-  svg += "<style>.title{font-weight:bold}.soft{fill:#555;font-size:12px}</style>\n"
-         "<defs><pattern id=\"hatch\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\" "
-         "patternTransform=\"rotate(45)\"><line x1=\"0\" y1=\"0\" x2=\"0\" y2=\"6\" stroke=\"white\" "
-         "stroke-width=\"1.6\"/></pattern></defs>\n";
+      "font-family=\"DejaVu Sans, Verdana, Arial, sans-serif\" font-size=\"13\" fill=\"%s\">\n",
+      kWidth, height, kWidth, height, kInk);
+  svg +=
+      "<style>.title{font-weight:bold}.soft{fill:#555;font-size:12px}</style>\n"
+      "<defs><pattern id=\"hatch\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\" "
+      "patternTransform=\"rotate(45)\"><line x1=\"0\" y1=\"0\" x2=\"0\" y2=\"6\" stroke=\"white\" "
+      "stroke-width=\"1.6\"/></pattern></defs>\n";
   svg += format("<rect width=\"%.0f\" height=\"%.0f\" fill=\"white\"/>\n", kWidth, height) + legend;
   const double share = kWidth / static_cast<double>(panels.size());
   for (std::size_t i = 0; i < panels.size(); ++i) {
@@ -251,7 +258,8 @@ std::string draw_figure(const std::vector<PlotPanel>& panels, const std::vector<
     svg += draw_panel({panels[i], left + kLeftMargin, top, left + share - kRightMargin, bottom});
   }
   for (std::size_t i = 0; i < caption.size(); ++i) {
-    svg += text(kLeftMargin - 50.0, caption_top + kCaptionRow * static_cast<double>(i), caption[i], "start", "class=\"soft\"");
+    svg += text(kLeftMargin - 60.0, caption_top + kCaptionRow * static_cast<double>(i), caption[i], "start",
+                "class=\"soft\"");
   }
   return svg + "</svg>\n";
 }

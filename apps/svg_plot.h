@@ -28,8 +28,8 @@ struct PlotPoint {
 
 enum class Marker { kCircle, kSquare, kDiamond };
 
-// Points that are not finite break the curve; what lies outside the axis is drawn at its border. Curves of one panel are
-// drawn a few units beside one another, so that equal ones are both seen.
+// Points that are not finite break the curve; what lies outside the axis is drawn at its border. Curves of one panel
+// are drawn a few units beside one another, so that equal ones are both seen.
 struct PlotCurve {
   std::string name, colour;
   Marker marker = Marker::kCircle;
@@ -64,14 +64,14 @@ struct PlotPanel {
   std::vector<PlotReference> references;
   std::vector<PlotLimit> limits;  // thin grey lines with a label
   std::vector<PlotBar> bars;
-  std::vector<PlotPart> parts;    // what the parts of the bars are
+  std::vector<PlotPart> parts;  // what the parts of the bars are
 };
 
 // Panels side by side under one legend (of the first panel's curves and references, and of all panels' parts), the
 // caption's lines underneath. The width is 960 units.
 std::string draw_figure(const std::vector<PlotPanel>& panels, const std::vector<std::string>& caption);
 
-// Decades from `low` to `high` as ticks; the first label is "≤ low", and there is a little room below it.
+// Decades from `low` to `high` as ticks; the first label is "≤low", and there is a little room below it.
 PlotAxis log_axis(const std::string& title, double low, double high);
 
 }  // namespace dofusion

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <limits>
 #include <set>
+#include <stdexcept>
 
 #include <nlohmann/json.hpp>
 
@@ -188,7 +189,12 @@ ModelFile read_model(const std::string& path) {
   model.config = config_from_json(config->second, path);
   const auto training = file.metadata.find("training");
   model.training = training == file.metadata.end() ? "{}" : training->second;
-  const std::vector<TensorInfo> infos = make_network(model.config)->tensors();
+  std::vector<TensorInfo> infos;
+  try {
+    infos = make_network(model.config)->tensors();
+  } catch (const std::runtime_error& e) {  // a network that this program was built without
+    throw InputError(path + ": a " + to_string(model.config.preset) + " model: " + e.what());
+  }
   if (file.tensors.size() != infos.size())
     throw InputError(path + ": weights of another architecture: " + std::to_string(file.tensors.size()) +
                      " tensors where the configuration needs " + std::to_string(infos.size()));

@@ -12,6 +12,8 @@ namespace {
 
 using nlohmann::json;
 
+constexpr double kMostPixels = 1e8;  // of an image: a wrong size shall not fill the memory
+
 double number_field(const json& object, const char* name, const std::string& path) {
   const auto field = object.find(name);
   if (field == object.end())
@@ -64,6 +66,9 @@ Camera read_camera(const std::string& path) {
   camera.width = size_field(file, "width", path);
   camera.height = size_field(file, "height", path);
   camera.depth_scale = positive_field(file, "depth_scale", path);
+  if (static_cast<double>(camera.width) * camera.height > kMostPixels)
+    throw InputError(path + ": an image of " + std::to_string(camera.width) + "x" + std::to_string(camera.height) +
+                     " pixels is more than the 100 million that are read");
   return camera;
 }
 

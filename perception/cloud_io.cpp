@@ -7,12 +7,77 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <optional>
+#include <set>
+#include <sstream>
+#include <vector>
 
 #include "stability/files.h"
 
 namespace dofusion {
 namespace {
+
+using Words = std::vector<std::string>;
+
+// A number of digits alone; none if it is something else or beyond 1e15.
+std::optional<std::uint64_t> whole_number(const std::string& word) {
+  if (word.empty() || word.size() > 15 || word.find_first_not_of("0123456789") != std::string::npos) return std::nullopt;
+  return std::stoull(word);
+}
+
+// Bytes of one point; none if the lines on its fields do not fit one another.
+std::optional<std::uint64_t> point_bytes(const Words& fields, const Words& sizes, const Words& types, const Words& counts) {
+  if (fields.empty() || fields.size() > 100 || sizes.size() != fields.size() || types.size() != fields.size()) return std::nullopt;
+  if (!counts.empty() && counts.size() != fields.size()) return std::nullopt;
+  std::uint64_t bytes = 0;
+  for (std::size_t i = 0; i < fields.size(); ++i) {
+    const auto size = whole_number(sizes[i]), count = counts.empty() ? 1 : whole_number(counts[i]);
+    const bool known = types[i] == "F" ? size == 4 || size == 8 : types[i] == "I" || types[i] == "U";
+    if (!known || !(size == 1 || size == 2 || size == 4 || size == 8) || !count || *count < 1 || *count > 100000) return std::nullopt;
+    bytes += *size * *count;
+  }
+  return bytes;
+}
+
+// PCL's reader trusts a PCD's header: some damaged ones crash it, and memory is taken for as many points as promised.
+// True if the header makes sense and its points have room in the file.
+bool has_sane_pcd_header(const std::string& path) {
+  constexpr int kMostLines = 200;
+  constexpr std::uint64_t kBestCompression = 100;  // LZF writes 264 bytes with 3
+  static const std::set<std::string> names = {"VERSION", "FIELDS", "COLUMNS",   "SIZE",   "TYPE", "COUNT",
+                                              "WIDTH",   "HEIGHT", "VIEWPOINT", "POINTS", "DATA"};
+  std::ifstream in(path, std::ios::binary);
+  std::map<std::string, Words> header;
+  std::string line;
+  for (int k = 0; k < kMostLines && header.count("DATA") == 0 && std::getline(in, line); ++k) {
+    std::istringstream words(line);
+    std::string name;
+    if (!(words >> name) || name.front() == '#') continue;
+    if (names.count(name) == 0) return false;
+    const Words values{std::istream_iterator<std::string>(words), {}};
+    if (!header.emplace(name, values).second) return false;  // it stood there already
+  }
+  const auto bytes = point_bytes(header["FIELDS"], header["SIZE"], header["TYPE"], header["COUNT"]);
+  for (const char* name : {"WIDTH", "HEIGHT", "POINTS", "DATA"}) {
+    if (header[name].size() != 1) return false;
+  }
+  const auto width = whole_number(header["WIDTH"][0]), height = whole_number(header["HEIGHT"][0]);
+  const auto points = whole_number(header["POINTS"][0]);
+  if (!bytes || !width || !height || !points || *width > 1000000000 || *height > 1000000 || *width * *height != *points) return false;
+  const std::uint64_t file_bytes = std::filesystem::file_size(path);
+  const std::string& data = header["DATA"][0];
+  if (data == "ascii") return 2 * *points <= file_bytes;  // a digit and the end of the line
+  if (data == "binary") return *points <= file_bytes / *bytes;
+  if (data != "binary_compressed" || *points > kBestCompression * file_bytes / *bytes) return false;
+  std::uint32_t packed = 0, unpacked = 0;  // little endian, as all the machines that PCL writes on
+  in.read(reinterpret_cast<char*>(&packed), sizeof packed).read(reinterpret_cast<char*>(&unpacked), sizeof unpacked);
+  return in && unpacked == *points * *bytes && packed <= file_bytes;
+}
 
 pcl::PointCloud<pcl::PointXYZ> read_cloud(const std::string& path) {
   std::error_code error;
@@ -24,7 +89,7 @@ pcl::PointCloud<pcl::PointXYZ> read_cloud(const std::string& path) {
   int status = -1;
   try {
     if (extension == ".pcd") {
-      status = pcl::PCDReader().read(path, cloud);
+      if (has_sane_pcd_header(path)) status = pcl::PCDReader().read(path, cloud);
     } else if (extension == ".ply") {
       status = pcl::PLYReader().read(path, cloud);
     } else {

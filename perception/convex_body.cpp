@@ -12,17 +12,16 @@
 namespace dofusion {
 namespace {
 
-constexpr double kSamePlane = 1e-5;     // of normals (length 1) and offsets (metres)
-constexpr double kMinVolume = 1e-9;     // cubic metres
+constexpr double kSamePlane = 1e-5;  // of normals (length 1) and offsets (metres)
+constexpr double kMinVolume = 1e-9;  // cubic metres
 
 std::vector<Eigen::Vector3d> edge_directions(const TriangleMesh& mesh) {
   std::vector<Eigen::Vector3d> directions;
   for (const Eigen::Vector3i& t : mesh.triangles) {
     for (int i = 0; i < 3; ++i) {
       const Eigen::Vector3d d = (mesh.vertices[t[(i + 1) % 3]] - mesh.vertices[t[i]]).normalized();
-      const bool known = std::any_of(directions.begin(), directions.end(), [&](const Eigen::Vector3d& e) {
-        return std::abs(e.dot(d)) > 1.0 - 1e-6;
-      });
+      const bool known = std::any_of(directions.begin(), directions.end(),
+                                     [&](const Eigen::Vector3d& e) { return std::abs(e.dot(d)) > 1.0 - 1e-6; });
       if (!known && d.allFinite()) directions.push_back(d);
     }
   }
@@ -82,7 +81,8 @@ std::optional<TriangleMesh> cut(const TriangleMesh& convex, const HalfSpace& hal
       const int a = t[i], b = t[(i + 1) % 3];
       if (a > b) continue;  // every edge once
       const double ha = height(a), hb = height(b);
-      if (ha * hb < 0.0) points.push_back(convex.vertices[a] + (convex.vertices[b] - convex.vertices[a]) * ha / (ha - hb));
+      if (ha * hb < 0.0)
+        points.push_back(convex.vertices[a] + (convex.vertices[b] - convex.vertices[a]) * ha / (ha - hb));
     }
   }
   return points.size() < 4 ? std::nullopt : solid_hull(points);

@@ -12,9 +12,9 @@ namespace {
 constexpr double kCorrelation = 3.0;
 
 struct Border {
-  int v = 0, u = 0;     // the last pixel of the first face
-  int dv = 0, du = 0;   // unit step towards the second
-  int gap = 1;          // pixels from the first face to the second
+  int v = 0, u = 0;    // the last pixel of the first face
+  int dv = 0, du = 0;  // unit step towards the second
+  int gap = 1;         // pixels from the first face to the second
 };
 
 class EdgeFinder {

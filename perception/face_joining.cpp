@@ -37,9 +37,13 @@ class Parts {
 class Joiner {
  public:
   Joiner(const FaceMap& map, const DepthImage& depth, const Camera& camera, const SegmentationOptions& options)
-      : map_(map), depth_(depth), camera_(camera), options_(options),
+      : map_(map),
+        depth_(depth),
+        camera_(camera),
+        options_(options),
         edges_(find_face_edges(map, depth, camera, options.faces)),
-        relation_(relate_faces(map, depth, camera, options.faces)), parts_(map.faces.size()),
+        relation_(relate_faces(map, depth, camera, options.faces)),
+        parts_(map.faces.size()),
         sliver_(find_slivers()) {}
 
   std::vector<int> join() {
@@ -82,8 +86,8 @@ class Joiner {
 
   // Parallel planes whose readings differ no more at the border than the sensor bends a plane.
   bool is_warp(const FaceEdge& edge) const {
-    constexpr double kStep = 1.0;    // sigmas, without any warp
-    constexpr double kWarps = 3.0;   // what remains beyond the root mean square
+    constexpr double kStep = 1.0;   // sigmas, without any warp
+    constexpr double kWarps = 3.0;  // what remains beyond the root mean square
     return edge.compared >= 2 * kMinBorder && std::abs(edge.reading_step) < kStep + kWarps * options_.warp;
   }
   bool is_smooth(const FaceEdge& edge) const {
@@ -163,8 +167,8 @@ class Joiner {
   }
 
   bool is_same_plane(int f, int g) const {
-    constexpr double kSame = 1.6;      // standard deviations
-    constexpr double kCertain = 3.0;   // sigmas of a reading
+    constexpr double kSame = 1.6;     // standard deviations
+    constexpr double kCertain = 3.0;  // sigmas of a reading
     const FaceRelation& fg = relation_[f][g];
     const FaceRelation& gf = relation_[g][f];
     return std::min(fg.blur, gf.blur) < kCertain && fg.rms < kSame && gf.rms < kSame;
@@ -184,7 +188,8 @@ class Joiner {
   std::vector<std::pair<Eigen::Vector2i, Eigen::Vector2i>> lines_between(int f, int g) const {
     const std::vector<Eigen::Vector2i> from = some_pixels(f), to = some_pixels(g);
     std::vector<std::pair<Eigen::Vector2i, Eigen::Vector2i>> lines;
-    for (std::size_t i = 0; i < std::min(from.size(), to.size()); ++i) lines.emplace_back(from[i], to[to.size() - 1 - i]);
+    for (std::size_t i = 0; i < std::min(from.size(), to.size()); ++i)
+      lines.emplace_back(from[i], to[to.size() - 1 - i]);
     return lines;
   }
 
@@ -229,8 +234,8 @@ class Joiner {
   }
 
   bool is_lifted(int part) const {
-    constexpr double kLifted = 6.0;      // sigmas above the table
-    constexpr double kLowest = 0.02;     // share of the part's readings that may be lower
+    constexpr double kLifted = 6.0;   // sigmas above the table
+    constexpr double kLowest = 0.02;  // share of the part's readings that may be lower
     const InversePlane& table = map_.faces[kTable].plane;
     int all = 0, low = 0;
     for (std::size_t p = 0; p < depth_.pixels.size(); ++p) {

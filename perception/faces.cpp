@@ -32,7 +32,9 @@ struct PlaneSums {
     count += other.count;
   }
   // Mean square of the deviations from the fitted plane, in sigmas.
-  double variance(const InversePlane& fitted) const { return std::max(0.0, c - fitted.dot(b)) / std::max(1, count - 3); }
+  double variance(const InversePlane& fitted) const {
+    return std::max(0.0, c - fitted.dot(b)) / std::max(1, count - 3);
+  }
 };
 
 struct LocalFit {
@@ -45,7 +47,10 @@ class FaceFinder {
  public:
   FaceFinder(const DepthImage& depth, const Camera& camera, const Image<std::uint8_t>& mask,
              const std::vector<InversePlane>& fixed, const FaceOptions& options)
-      : camera_(camera), options_(options), width_(depth.width), height_(depth.height),
+      : camera_(camera),
+        options_(options),
+        width_(depth.width),
+        height_(depth.height),
         fixed_(static_cast<int>(fixed.size())) {
     collect_readings(depth, mask);
     map_.index = Image<int>(width_, height_, kNoFace);
@@ -54,8 +59,12 @@ class FaceFinder {
 
   FaceMap find() {
     claim_for_fixed();
-    fit_surroundings();
-    for (const int seed : seeds_by_flatness()) grow(seed);
+    // Faces narrower than the surroundings of a reading show once their neighbours are taken out of these.
+    constexpr int kRounds = 3;
+    for (int round = 0; round < kRounds; ++round) {
+      fit_surroundings();
+      for (const int seed : seeds_by_flatness()) grow(seed);
+    }
     for (int i = 0; i < options_.iterations; ++i) {
       compete();
       refit();
@@ -124,7 +133,8 @@ class FaceFinder {
     constexpr double kSteepest = 5.0;  // tangent of the steepest incidence that still counts as one surface
     const double z = 1.0 / inverse_[p];
     const double sigma_z = sigma_[p] * z * z;
-    const int radius = std::clamp(static_cast<int>(std::lround(options_.window_sigmas * sigma_z * camera_.fx / z)), 3, 12);
+    const int radius =
+        std::clamp(static_cast<int>(std::lround(options_.window_sigmas * sigma_z * camera_.fx / z)), 3, 12);
     const int step = radius > 6 ? 2 : 1;
     const int v0 = p / width_, u0 = p % width_;
     PlaneSums sums;
@@ -152,7 +162,8 @@ class FaceFinder {
     constexpr float kFlat = 1.6F;  // sigmas
     std::vector<int> seeds;
     for (const int p : readings_) {
-      if (local_[p].rms < kFlat && (p % width_) % 2 == 0 && (p / width_) % 2 == 0) seeds.push_back(p);
+      if (map_.index.pixels[p] == kNoFace && local_[p].rms < kFlat && (p % width_) % 2 == 0 && (p / width_) % 2 == 0)
+        seeds.push_back(p);
     }
     std::stable_sort(seeds.begin(), seeds.end(), [&](int a, int b) { return local_[a].rms < local_[b].rms; });
     return seeds;
@@ -210,7 +221,8 @@ class FaceFinder {
         }
       }
       const bool inside = std::all_of(around.begin(), around.begin() + count, [&](int f) { return f == around[0]; });
-      if (inside && around[0] != kNoFace && std::abs(deviation(p, map_.faces[around[0]].plane)) < options_.grow) continue;
+      if (inside && around[0] != kNoFace && std::abs(deviation(p, map_.faces[around[0]].plane)) < options_.grow)
+        continue;
       map_.index.pixels[p] = best_face(p, around, count);
     }
   }
@@ -226,7 +238,8 @@ class FaceFinder {
       if (cost < best_cost) best_cost = cost, best = face;
     };
     for (int i = 0; i < count; ++i) {
-      if (around[i] == kNoFace || std::find(around.begin(), around.begin() + i, around[i]) != around.begin() + i) continue;
+      if (around[i] == kNoFace || std::find(around.begin(), around.begin() + i, around[i]) != around.begin() + i)
+        continue;
       consider(around[i]);
     }
     for (int f = 0; f < fixed_; ++f) consider(f);

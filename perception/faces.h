@@ -9,29 +9,29 @@
 namespace dofusion {
 
 struct FaceOptions {
-  DepthSigma sigma;              // of the depth readings
-  double lateral_px = 0.5;       // lateral noise: a steep face's readings scatter by its depth slope times this
-  double grow = 3.0;             // sigmas; readings nearer to a growing face's plane join it
-  double keep = 4.0;             // sigmas; readings farther from every neighbouring face belong to none
-  double normal_deg = 40.0;      // a reading whose surroundings are inclined more to the face does not join it
-  double window_sigmas = 6.0;    // radius of the surroundings that a reading's plane is fitted to
-  int min_pixels = 30;           // of a face
-  int iterations = 6;            // of the competition for readings between neighbouring faces
-  double smoothness = 0.4;       // what a neighbour with another face costs, in squared sigmas
+  DepthSigma sigma;            // of the depth readings
+  double lateral_px = 0.5;     // lateral noise: a steep face's readings scatter by its depth slope times this
+  double grow = 3.0;           // sigmas; readings nearer to a growing face's plane join it
+  double keep = 4.0;           // sigmas; readings farther from every neighbouring face belong to none
+  double normal_deg = 40.0;    // a reading whose surroundings are inclined more to the face does not join it
+  double window_sigmas = 6.0;  // radius of the surroundings that a reading's plane is fitted to
+  int min_pixels = 30;         // of a face
+  int iterations = 6;          // of the competition for readings between neighbouring faces
+  double smoothness = 0.4;     // what a neighbour with another face costs, in squared sigmas
 };
 
 struct Face {
   InversePlane plane = InversePlane::Zero();  // camera frame, a·X = 1
   int pixels = 0;
-  double rms = 0.0;                           // of its readings, sigmas
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // of `plane`, from independent readings
+  double rms = 0.0;                                               // of its readings, sigmas
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();           // of `plane`, from independent readings
   Eigen::Vector3d normal() const { return -plane.normalized(); }  // towards the camera
 };
 
 inline constexpr int kNoFace = -1;
 
 struct FaceMap {
-  Image<int> index;         // per pixel a face or kNoFace
+  Image<int> index;  // per pixel a face or kNoFace
   std::vector<Face> faces;
 };
 

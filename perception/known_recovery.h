@@ -12,7 +12,7 @@ struct KnownRecoveryOptions {
   int threads = 1;
   DepthSigma sigma;               // of the readings; scaled to what the table's own readings scatter
   double cluster_distance = 0.05; // metres between readings of objects that are searched for jointly
-  int beam = 3;                   // partial scenes of a cluster that are kept
+  int beam = 6;                   // partial scenes that are kept where adding object by object leaves something over
   int fewest_pixels = 40;         // that an object must show
   double min_score = 0.75;        // an object that explains less is not believed
   bool settle = true;             // let the recovered scene come to rest in physics

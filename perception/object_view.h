@@ -9,18 +9,18 @@
 namespace dofusion {
 
 struct ObservedFace {
-  HalfSpace plane;                                       // world, outward
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();      // of its points
+  HalfSpace plane;                                   // world, outward
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  // of its points
   int pixels = 0;
 };
 
 struct ObjectView {
   int label = 0;
-  int pixels = 0;                        // with the label
-  std::vector<Eigen::Vector3d> points;   // world, metres; readings on faces, or all if there is no face
-  std::vector<double> sigma;             // of the points along their rays, metres
-  std::vector<ObservedFace> faces;       // by falling number of pixels; faces of one plane are one
-  double lowest = 0.0;                   // height that almost all points exceed, metres
+  int pixels = 0;                       // with the label
+  std::vector<Eigen::Vector3d> points;  // world, metres; readings on faces, or all if there is no face
+  std::vector<double> sigma;            // of the points along their rays, metres
+  std::vector<ObservedFace> faces;      // by falling number of pixels; faces of one plane are one
+  double lowest = 0.0;                  // height that almost all points exceed, metres
 };
 
 // The view of the object with `label`. Without a reading it has no points.

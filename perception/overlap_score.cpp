@@ -97,8 +97,8 @@ int near_boundary(const LabelImage& of, std::uint8_t label, const LabelImage& to
 }
 
 int count_labelled(const LabelImage& labels) {
-  return static_cast<int>(std::count_if(labels.pixels.begin(), labels.pixels.end(),
-                                        [](std::uint8_t l) { return l >= kLabelFirstObject; }));
+  return static_cast<int>(
+      std::count_if(labels.pixels.begin(), labels.pixels.end(), [](std::uint8_t l) { return l >= kLabelFirstObject; }));
 }
 
 }  // namespace

@@ -6,7 +6,7 @@
 namespace dofusion {
 
 struct OverlapScore {
-  int found = 0;            // objects
+  int found = 0;  // objects
   int true_objects = 0;
   double overlap_f = 0.0;   // 0 … 1
   double boundary_f = 0.0;  // 0 … 1

@@ -6,7 +6,6 @@
 #include <limits>
 
 #include <Eigen/Dense>
-
 #include <pcl/io/pcd_io.h>
 #include <pcl/io/ply_io.h>
 #include <pcl/sample_consensus/ransac.h>
@@ -35,7 +34,8 @@ Line fit_line(const std::vector<std::pair<double, double>>& ratio_and_pixel) {
   if (!(spread > 1e-12)) return {};
   Line line{(n * sxy - sx * sy) / spread, 0.0, 0.0};
   line.offset = (sy - line.slope * sx) / n;
-  for (const auto& [x, y] : ratio_and_pixel) line.error = std::max(line.error, std::abs(line.slope * x + line.offset - y));
+  for (const auto& [x, y] : ratio_and_pixel)
+    line.error = std::max(line.error, std::abs(line.slope * x + line.offset - y));
   return line;
 }
 
@@ -105,7 +105,8 @@ std::optional<Table> cloud_table(const Cloud::ConstPtr& points, double band) {
   if (inliers.size() < 3 || std::abs(fine[3]) < 1e-6F) return std::nullopt;
   Table table = table_from_plane(-normal / static_cast<double>(fine[3]));
   double squares = 0.0;
-  for (const int i : inliers) squares += std::pow(normal.dot((*points)[i].getVector3fMap().cast<double>()) + fine[3], 2);
+  for (const int i : inliers)
+    squares += std::pow(normal.dot((*points)[i].getVector3fMap().cast<double>()) + fine[3], 2);
   table.inliers = static_cast<int>(inliers.size());
   table.residual = std::sqrt(squares / static_cast<double>(inliers.size()));
   return table;

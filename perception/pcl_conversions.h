@@ -37,10 +37,10 @@ struct CloudView {
 std::optional<CloudView> view_cloud(const Cloud& cloud, int width = 640);
 
 struct CloudSegmentationOptions {
-  DepthSigma sigma;                  // of the points' depth
-  double table_band = 3.0;           // sigmas; points nearer to the plane belong to the table
-  double cluster_distance = 0.012;   // metres; points nearer to each other belong to one object
-  int min_points = 50;               // of an object
+  DepthSigma sigma;                 // of the points' depth
+  double table_band = 3.0;          // sigmas; points nearer to the plane belong to the table
+  double cluster_distance = 0.012;  // metres; points nearer to each other belong to one object
+  int min_points = 50;              // of an object
 };
 
 struct CloudSegmentation {

@@ -7,9 +7,9 @@
 namespace dofusion {
 
 struct PlausibleScene {
-  Scene scene;                                     // settled, or as given if the simulation diverged
-  double moved_pct = 0.0;                          // the largest translation from the given pose, per cent of the diameter
-  double moved_deg = 0.0;                          // the largest rotation
+  Scene scene;             // settled, or as given if the simulation diverged
+  double moved_pct = 0.0;  // the largest translation from the given pose, per cent of the diameter
+  double moved_deg = 0.0;  // the largest rotation
   SettleStatus status = SettleStatus::kDiverged;
 };
 

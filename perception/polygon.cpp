@@ -19,12 +19,14 @@ Polygon convex_hull_2d(std::vector<Eigen::Vector2d> points) {
   });
   if (points.size() < 3) return points;
   Polygon hull;
-  points.erase(std::unique(points.begin(), points.end(),
-                           [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return (a - b).norm() < kSamePoint; }),
-               points.end());
+  points.erase(
+      std::unique(points.begin(), points.end(),
+                  [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return (a - b).norm() < kSamePoint; }),
+      points.end());
   if (points.size() < 3) return points;
   const auto add = [&](const Eigen::Vector2d& p, std::size_t keep) {
-    while (hull.size() >= keep + 2 && cross(hull.back() - hull[hull.size() - 2], p - hull.back()) <= 0.0) hull.pop_back();
+    while (hull.size() >= keep + 2 && cross(hull.back() - hull[hull.size() - 2], p - hull.back()) <= 0.0)
+      hull.pop_back();
     hull.push_back(p);
   };
   for (const Eigen::Vector2d& p : points) add(p, 0);

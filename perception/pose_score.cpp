@@ -78,6 +78,7 @@ Observation observe(const DepthImage& depth, const Camera& camera, const Table& 
   seen.missing = Image<float>(seen.camera.width, seen.camera.height, 1.0f);
   seen.background = DepthImage(seen.camera.width, seen.camera.height, kNoTable);
   seen.labels = LabelImage(seen.camera.width, seen.camera.height, kLabelNothing);
+  std::vector<double> sigmas;
   for (int row = 0; row < seen.camera.height; ++row) {
     for (int column = 0; column < seen.camera.width; ++column) {
       const int v = window.v0 + row * window.stride, u = window.u0 + column * window.stride;
@@ -87,10 +88,15 @@ Observation observe(const DepthImage& depth, const Camera& camera, const Table& 
         const double sigma = sigma_of(z) + kFloor;
         seen.precision.at(row, column) = static_cast<float>(0.5 / (sigma * sigma));
         seen.missing.at(row, column) = 0.0f;
+        sigmas.push_back(sigma);
       }
       seen.background.at(row, column) = table_depth(camera, table.T_world_camera, u, v);
       seen.labels.at(row, column) = labels.at(v, u);
     }
+  }
+  if (!sigmas.empty()) {
+    std::nth_element(sigmas.begin(), sigmas.begin() + sigmas.size() / 2, sigmas.end());
+    seen.sigma = sigmas[sigmas.size() / 2];
   }
   return seen;
 }

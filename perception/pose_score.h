@@ -25,6 +25,7 @@ struct Observation {
   Image<float> precision;  // 1 / (2 sigma^2), 0 without a reading
   Image<float> missing;    // 1 without a reading, else 0
   DepthImage background;   // z-depth of the bare table, a large number where the ray misses it
+  double sigma = 0.0;         // metres, median of the readings' standard deviations
   float table_facing = 0.0f;  // cosine of the incidence on the table in the window's middle
   LabelImage labels;
 };

@@ -1,5 +1,6 @@
 #include "perception/scene_score.h"
 
+#include <algorithm>
 #include <optional>
 
 namespace dofusion {
@@ -29,6 +30,9 @@ SceneHypothesis refine_jointly(const std::vector<ObjectModel>& models, const Clu
   SceneHypothesis scene = start;
   scene.score = scene_score(models, cluster, scene.objects, true, costs);
   PoseScorer scorer(cluster.pyramid.fine);
+  // At last only readings that the noise allows: others see another face, or pass the outline.
+  const double noise = 3.0 * scorer.observation().sigma;
+  const AlignOptions closing{4, std::max(0.003, noise), noise + 0.0005};
   for (int round = 0; round < 2; ++round) {
     for (std::size_t i = 0; i < scene.objects.size(); ++i) {
       const std::vector<PlacedObject> others = without(scene.objects, i);
@@ -46,7 +50,7 @@ SceneHypothesis refine_jointly(const std::vector<ObjectModel>& models, const Clu
                  floating_cost(models, at, others, costs.floating);
         };
         const Pose aligned = align_to_readings(scorer, rest_of_scene, model.object->mesh, object.T_world_object,
-                                               object.freedom, {2, 0.006, 0.006});
+                                               object.freedom, closing);
         if (objective(aligned) > objective(object.T_world_object)) object.T_world_object = aligned;
         object.T_world_object =
             climb(objective, object.T_world_object, object.freedom, model.radius, {0.001, 0.00025, 2}).T_world_object;

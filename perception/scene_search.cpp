@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <set>
 
 namespace dofusion {
 namespace {
 
 constexpr double kTooFarBehind = 400.0;  // nats before refinement, for a change to be tried
 constexpr double kRival = 200.0;         // nats after it, to be remembered
+constexpr double kMostBehind = 0.3;      // share of a new object's readings that may lie behind it
+constexpr int kRefined = 4;              // grown scenes that are refined
 
 // Share of an object's pixels that may contradict it in a scene that needs no second look.
 constexpr double kSurelyExplained = 0.03;
@@ -50,6 +53,31 @@ std::vector<SceneHypothesis> distinct_scenes(const std::vector<ObjectModel>& mod
   return kept;
 }
 
+// The best scenes (sorted already), no two of the same shapes: a large object that is slightly wrong explains more
+// than a small one that is right, in several poses.
+std::vector<SceneHypothesis> of_various_shapes(const std::vector<SceneHypothesis>& scenes, int count) {
+  std::vector<SceneHypothesis> chosen;
+  std::set<std::vector<int>> taken;
+  for (const SceneHypothesis& scene : scenes) {
+    std::vector<int> shapes;
+    for (const PlacedObject& object : scene.objects) shapes.push_back(object.model);
+    std::sort(shapes.begin(), shapes.end());
+    if (static_cast<int>(chosen.size()) < count && taken.insert(shapes).second) chosen.push_back(scene);
+  }
+  return chosen;
+}
+
+// Leaves out the objects without which the scene scores better.
+SceneHypothesis pruned(const std::vector<ObjectModel>& models, const Cluster& cluster, SceneHypothesis scene,
+                       const SceneCosts& costs) {
+  for (std::size_t i = scene.objects.size(); i-- > 0;) {
+    SceneHypothesis fewer{without(scene.objects, i), 0.0};
+    fewer.score = scene_score(models, cluster, fewer.objects, true, costs);
+    if (fewer.score > scene.score) scene = fewer;
+  }
+  return scene;
+}
+
 // Each object of the scene replaced by whatever else explains its place about as well or better. Returns the best
 // scene and adds its rivals, which physics may prefer, to `rivals`.
 SceneHypothesis improved_by_swaps(const std::vector<ObjectModel>& models, const Cluster& cluster,
@@ -75,11 +103,20 @@ SceneHypothesis improved_by_swaps(const std::vector<ObjectModel>& models, const 
   return scene;
 }
 
+// Most of what the camera would see of it is there.
+bool is_believable(const std::vector<ObjectModel>& models, const Cluster& cluster, const Explanation& scene,
+                   const Candidate& candidate) {
+  PoseScorer scorer(cluster.pyramid.fine);
+  const PixelCounts counts =
+      scorer.count(scene, models[candidate.placed.model].object->mesh, candidate.placed.T_world_object);
+  return counts.behind < kMostBehind * (counts.explained + counts.behind);
+}
+
 // The scene and, one object more on each level, the scenes that contain it, `beam` of them on every level.
 std::vector<SceneHypothesis> grow_scenes(const std::vector<ObjectModel>& models, const Cluster& cluster, int beam,
-                                         const SceneSearchOptions& options) {
+                                         int most_objects, const SceneSearchOptions& options) {
   std::vector<SceneHypothesis> open = {{{}, scene_score(models, cluster, {}, false, options.costs)}}, complete;
-  for (int count = 0; count < options.most_objects && !open.empty(); ++count) {
+  for (int count = 0; count < most_objects && !open.empty(); ++count) {
     std::vector<SceneHypothesis> next;
     for (const SceneHypothesis& scene : open) {
       const PyramidScene explained = explain(cluster.pyramid, models, scene.objects);
@@ -87,22 +124,31 @@ std::vector<SceneHypothesis> grow_scenes(const std::vector<ObjectModel>& models,
       complete.push_back(scene);
       if (!target) continue;
       const std::vector<Candidate> candidates = candidates_for(models, cluster, explained, *target, options);
-      for (std::size_t i = 0; i < candidates.size() && static_cast<int>(i) < options.branches; ++i) {
-        if (candidates[i].gain < options.costs.object) break;
+      std::vector<int> branches_of(models.size(), 0);
+      int branches = 0;
+      for (const Candidate& candidate : candidates) {
+        if (candidate.gain < options.costs.object || branches == options.branches) break;
+        if (++branches_of[candidate.placed.model] > 2 || !is_believable(models, cluster, explained.fine, candidate)) {
+          continue;
+        }
         SceneHypothesis larger = scene;
-        larger.objects.push_back(candidates[i].placed);
+        larger.objects.push_back(candidate.placed);
         larger.score = scene_score(models, cluster, larger.objects, false, options.costs);
         next.push_back(larger);
+        ++branches;
       }
     }
     sort_best_first(next);
-    open.assign(next.begin(), next.begin() + std::min<std::ptrdiff_t>(beam, next.size()));
-    complete.insert(complete.end(), next.begin() + open.size(), next.end());
+    open = of_various_shapes(next, beam);
+    complete.insert(complete.end(), next.begin(), next.end());
+    // What an inexact pose leaves unexplained must not call for another object.
+    for (SceneHypothesis& scene : open) scene = refine_jointly(models, cluster, scene, options.costs);
   }
   complete.insert(complete.end(), open.begin(), open.end());
-  sort_best_first(complete);
-  complete.resize(std::min<std::size_t>(complete.size(), options.beam));
-  for (SceneHypothesis& scene : complete) scene = refine_jointly(models, cluster, scene, options.costs);
+  complete = distinct_scenes(models, std::move(complete), kRefined);
+  for (SceneHypothesis& scene : complete) {
+    scene = pruned(models, cluster, refine_jointly(models, cluster, scene, options.costs), options.costs);
+  }
   sort_best_first(complete);
   return complete;
 }
@@ -129,14 +175,19 @@ bool explains_all(const std::vector<ObjectModel>& models, const Cluster& cluster
 std::vector<SceneHypothesis> search_scenes(const std::vector<ObjectModel>& models, const Cluster& cluster,
                                            const SceneSearchOptions& options) {
   // Object by object first. Only where that leaves something open are several partial scenes followed.
-  std::vector<SceneHypothesis> scenes = grow_scenes(models, cluster, 1, options);
-  if (scenes.front().objects.size() > 1) {
-    scenes.front() = improved_by_swaps(models, cluster, scenes.front(), options, scenes);
-  }
-  sort_best_first(scenes);
-  if (options.beam > 1 && !explains_all(models, cluster, scenes.front(), options)) {
-    std::vector<SceneHypothesis> more = grow_scenes(models, cluster, options.beam, options);
-    if (more.front().objects.size() > 1) more.front() = improved_by_swaps(models, cluster, more.front(), options, more);
+  std::vector<SceneHypothesis> scenes = grow_scenes(models, cluster, 1, options.most_objects, options);
+  const auto improve_front = [&](std::vector<SceneHypothesis>& grown) {
+    if (grown.front().objects.size() < 2) return;
+    std::vector<SceneHypothesis> rivals;
+    grown.push_back(improved_by_swaps(models, cluster, grown.front(), options, rivals));
+    grown.insert(grown.end(), rivals.begin(), rivals.end());
+    sort_best_first(grown);
+  };
+  improve_front(scenes);
+  if (options.beam > 1 && !scenes.front().objects.empty() && !explains_all(models, cluster, scenes.front(), options)) {
+    const int count = static_cast<int>(scenes.front().objects.size());
+    std::vector<SceneHypothesis> more = grow_scenes(models, cluster, options.beam, count + 1, options);
+    if (more.front().score > scenes.front().score) improve_front(more);
     scenes.insert(scenes.end(), more.begin(), more.end());
   }
   return distinct_scenes(models, std::move(scenes), options.returned);

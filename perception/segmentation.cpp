@@ -129,7 +129,8 @@ Image<int> number_pixels(const DepthImage& depth, const Camera& camera, const Fa
   for (std::size_t p = 0; p < left.pixels.size(); ++p) {
     left.pixels[p] = above.pixels[p] && number.pixels[p] < 0 && map.index.pixels[p] == kNoFace;
   }
-  const int faces_end = object_of_face.empty() ? 0 : 1 + *std::max_element(object_of_face.begin(), object_of_face.end());
+  const int faces_end =
+      object_of_face.empty() ? 0 : 1 + *std::max_element(object_of_face.begin(), object_of_face.end());
   const Components rest = connected_components(left);
   for (std::size_t p = 0; p < left.pixels.size(); ++p) {
     if (left.pixels[p]) number.pixels[p] = std::max(0, faces_end) + rest.index.pixels[p] - 1;
@@ -139,8 +140,8 @@ Image<int> number_pixels(const DepthImage& depth, const Camera& camera, const Fa
 
 struct Extent {
   int pixels = 0;
-  double area = 0.0;             // square metres, seen head-on
-  double deviation = 0.0;        // mean, in sigmas above the table
+  double area = 0.0;       // square metres, seen head-on
+  double deviation = 0.0;  // mean, in sigmas above the table
 };
 
 // Labels for the objects that are large enough and stand out of the table's band, by falling number of pixels.
@@ -200,8 +201,8 @@ LabelImage segment(const DepthImage& depth, const Camera& camera, const Table& t
   const InversePlane plane = table_plane(table);
   const Image<float> deviation = table_deviations(depth, camera, plane, options.faces);
   const Image<std::uint8_t> above = pixels_above_table(depth, camera, plane, deviation, options);
-  const FaceMap faces = find_faces(depth, camera, with_margin(above, deviation, options.table_band), {plane},
-                                   options.faces);
+  const FaceMap faces =
+      find_faces(depth, camera, with_margin(above, deviation, options.table_band), {plane}, options.faces);
   const std::vector<int> object_of_face = join_faces(faces, depth, camera, options);
   const Image<int> number = number_pixels(depth, camera, faces, object_of_face, above, options.faces);
   LabelImage labels = label_objects(depth, camera, number, deviation, options);
@@ -209,8 +210,8 @@ LabelImage segment(const DepthImage& depth, const Camera& camera, const Table& t
   return labels;
 }
 
-LabelImage segment_with_mask(const DepthImage& depth, const Camera& camera, const Table& table,
-                             const LabelImage& mask, const SegmentationOptions& user_options) {
+LabelImage segment_with_mask(const DepthImage& depth, const Camera& camera, const Table& table, const LabelImage& mask,
+                             const SegmentationOptions& user_options) {
   check_image_size(depth.width, depth.height, camera);
   check_image_size(mask.width, mask.height, camera);
   const SegmentationOptions options = calibrated(depth, camera, table, user_options);

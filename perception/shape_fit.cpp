@@ -16,12 +16,17 @@ const Eigen::Vector3d kUp = Eigen::Vector3d::UnitZ();
 // What a simpler shape may score less than a freer one.
 double preference(ShapeKind kind) {
   switch (kind) {
-    case ShapeKind::kUprightBox: return 0.10;
-    case ShapeKind::kUprightCylinder: return 0.08;
-    case ShapeKind::kUprightPrism: return 0.05;
+    case ShapeKind::kUprightBox:
+      return 0.10;
+    case ShapeKind::kUprightCylinder:
+      return 0.08;
+    case ShapeKind::kUprightPrism:
+      return 0.05;
     case ShapeKind::kTiltedBox:
-    case ShapeKind::kLyingPrism: return 0.03;
-    case ShapeKind::kHull: return 0.0;
+    case ShapeKind::kLyingPrism:
+      return 0.03;
+    case ShapeKind::kHull:
+      return 0.0;
   }
   return 0.0;
 }
@@ -58,8 +63,8 @@ Polygon round_polygon(const Circle& circle, int sides) {
 }
 
 // Corners of the hull of the points with the most important ones first, until none lies further out than `tolerance`.
-std::optional<TriangleMesh> coarse_hull(const std::vector<Eigen::Vector3d>& points, std::vector<Eigen::Vector3d> corners,
-                                        double tolerance, int max_corners) {
+std::optional<TriangleMesh> coarse_hull(const std::vector<Eigen::Vector3d>& points,
+                                        std::vector<Eigen::Vector3d> corners, double tolerance, int max_corners) {
   const std::optional<TriangleMesh> fine = solid_hull(points);
   if (!fine) return std::nullopt;
   const std::size_t start = corners.size();
@@ -88,7 +93,10 @@ std::optional<TriangleMesh> coarse_hull(const std::vector<Eigen::Vector3d>& poin
 class ShapeFitter {
  public:
   ShapeFitter(const ObjectView& view, double support, const ShapeEvidence& evidence, const ShapeFitOptions& options)
-      : view_(view), support_(support), evidence_(evidence), options_(options),
+      : view_(view),
+        support_(support),
+        evidence_(evidence),
+        options_(options),
         tolerance_(3.0 * quantile(view.sigma, 0.5) + options.slack) {}
 
   std::optional<FittedShape> fit() {
@@ -149,7 +157,8 @@ class ShapeFitter {
     for (const double yaw : yaw_candidates(hull)) propose_upright_box(yaw, top);
     if (best_) {
       const double yaw = std::atan2(best_->R(1, 0), best_->R(0, 0));
-      for (const double off_deg : {-4.0, -2.0, -1.0, 1.0, 2.0, 4.0}) propose_upright_box(yaw + off_deg * M_PI / 180.0, top);
+      for (const double off_deg : {-4.0, -2.0, -1.0, 1.0, 2.0, 4.0})
+        propose_upright_box(yaw + off_deg * M_PI / 180.0, top);
     }
     const Polygon outline = snapped(simplified(hull, tolerance_, options_.max_corners), I);
     propose(prism(I, outline, support_, top), I, ShapeKind::kUprightPrism);
@@ -160,7 +169,8 @@ class ShapeFitter {
 
   void propose_upright_box(double yaw, double top) {
     const Eigen::Matrix3d R = Eigen::AngleAxisd(yaw, kUp).toRotationMatrix();
-    propose(prism(Eigen::Matrix3d::Identity(), footprint_rectangle(yaw, top), support_, top), R, ShapeKind::kUprightBox);
+    propose(prism(Eigen::Matrix3d::Identity(), footprint_rectangle(yaw, top), support_, top), R,
+            ShapeKind::kUprightBox);
   }
 
   // From the upright faces, and the least rectangle around the footprint.
@@ -287,7 +297,8 @@ class ShapeFitter {
       for (std::size_t j = i + 1; j < view_.faces.size() && j < 4; ++j) {
         const ObservedFace &a = view_.faces[i], &b = view_.faces[j];
         if (!is_large(a) || !is_large(b) || std::abs(a.plane.normal.dot(b.plane.normal)) > 0.2) continue;
-        if ((is_level(a) && is_upright(b)) || (is_level(b) && is_upright(a)) || (is_upright(a) && is_upright(b))) continue;
+        if ((is_level(a) && is_upright(b)) || (is_level(b) && is_upright(a)) || (is_upright(a) && is_upright(b)))
+          continue;
         Eigen::Matrix3d R;
         R.col(0) = a.plane.normal;
         R.col(1) = (b.plane.normal - b.plane.normal.dot(R.col(0)) * R.col(0)).normalized();
@@ -308,9 +319,14 @@ class ShapeFitter {
     }
     // The axis nearest to the vertical reaches down to the support.
     const double missing = (lowest - support_) / std::abs(R(2, down));
-    if (missing > 0.0) (R(2, down) > 0.0 ? sides[down].low : sides[down].high) -= (R(2, down) > 0.0 ? 1.0 : -1.0) * missing;
-    return prism(R, {{sides[0].low, sides[1].low}, {sides[0].high, sides[1].low}, {sides[0].high, sides[1].high},
-                     {sides[0].low, sides[1].high}}, sides[2].low, sides[2].high);
+    if (missing > 0.0)
+      (R(2, down) > 0.0 ? sides[down].low : sides[down].high) -= (R(2, down) > 0.0 ? 1.0 : -1.0) * missing;
+    return prism(R,
+                 {{sides[0].low, sides[1].low},
+                  {sides[0].high, sides[1].low},
+                  {sides[0].high, sides[1].high},
+                  {sides[0].low, sides[1].high}},
+                 sides[2].low, sides[2].high);
   }
 
   // The hull of the points and their feet on the support.
@@ -341,12 +357,18 @@ class ShapeFitter {
 
 std::string to_string(ShapeKind kind) {
   switch (kind) {
-    case ShapeKind::kUprightBox: return "upright box";
-    case ShapeKind::kUprightCylinder: return "upright cylinder";
-    case ShapeKind::kUprightPrism: return "upright prism";
-    case ShapeKind::kLyingPrism: return "lying prism";
-    case ShapeKind::kTiltedBox: return "tilted box";
-    case ShapeKind::kHull: return "hull";
+    case ShapeKind::kUprightBox:
+      return "upright box";
+    case ShapeKind::kUprightCylinder:
+      return "upright cylinder";
+    case ShapeKind::kUprightPrism:
+      return "upright prism";
+    case ShapeKind::kLyingPrism:
+      return "lying prism";
+    case ShapeKind::kTiltedBox:
+      return "tilted box";
+    case ShapeKind::kHull:
+      return "hull";
   }
   return "shape";
 }

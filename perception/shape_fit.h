@@ -9,23 +9,23 @@
 namespace dofusion {
 
 struct ShapeFitOptions {
-  double level_deg = 12.0;       // a face inclined less to the table's plane is level
-  double upright_deg = 12.0;     // a face inclined less to the vertical is upright
-  double slack = 0.002;          // metres, with three sigmas of a reading: what a shape may miss it by
-  double min_face_share = 0.1;   // of the largest face's pixels; smaller faces propose no shape
-  int max_corners = 10;          // of a footprint or profile that is neither a rectangle nor a circle
+  double level_deg = 12.0;      // a face inclined less to the table's plane is level
+  double upright_deg = 12.0;    // a face inclined less to the vertical is upright
+  double slack = 0.002;         // metres, with three sigmas of a reading: what a shape may miss it by
+  double min_face_share = 0.1;  // of the largest face's pixels; smaller faces propose no shape
+  int max_corners = 10;         // of a footprint or profile that is neither a rectangle nor a circle
   int circle_sides = 16;
-  int max_hull_corners = 20;     // of the fallback hull; 2 n - 4 triangles
+  int max_hull_corners = 20;  // of the fallback hull; 2 n - 4 triangles
 };
 
 enum class ShapeKind { kUprightBox, kUprightCylinder, kUprightPrism, kLyingPrism, kTiltedBox, kHull };
 std::string to_string(ShapeKind kind);
 
 struct FittedShape {
-  TriangleMesh mesh;                                   // world, closed, convex
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();     // world; axes of the shape, along its edges if it is a box
+  TriangleMesh mesh;                                // world, closed, convex
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();  // world; axes of the shape, along its edges if it is a box
   ShapeKind kind = ShapeKind::kHull;
-  double score = 0.0;                                  // share of the readings explained less those contradicted
+  double score = 0.0;  // share of the readings explained less those contradicted
 };
 
 // The image that a shape must agree with.

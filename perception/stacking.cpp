@@ -163,7 +163,7 @@ bool is_high_enough(const TriangleMesh& mesh, double min_size) {
 
 std::optional<FittedShape> fit_on_support(const ObjectView& view, const std::vector<Body>& bodies,
                                           const ShapeEvidence& evidence, const UnknownRecoveryOptions& options) {
-  constexpr double kTips = 0.15;    // of the score
+  constexpr double kTips = 0.15;  // of the score
   constexpr double kCutsIn = 0.25;
   std::optional<FittedShape> best;
   double best_score = 0.0;

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include <Eigen/Dense>
-
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 #include <pcl/sample_consensus/ransac.h>
@@ -16,9 +15,9 @@ namespace dofusion {
 namespace {
 
 struct Reading {
-  Eigen::Vector3d ray;  // (x, y, 1)
-  double inverse = 0.0; // 1/z, 1/metre
-  double sigma = 0.0;   // of the inverse depth, 1/metre
+  Eigen::Vector3d ray;   // (x, y, 1)
+  double inverse = 0.0;  // 1/z, 1/metre
+  double sigma = 0.0;    // of the inverse depth, 1/metre
 };
 
 std::vector<Reading> valid_readings(const DepthImage& depth, const Camera& camera, const TableOptions& options) {
@@ -156,8 +155,7 @@ std::optional<Table> find_table(const DepthImage& depth, const Camera& camera, c
   return table;
 }
 
-DepthSigma calibrate_sigma(const DepthImage& depth, const Camera& camera, const Table& table,
-                           const DepthSigma& prior) {
+DepthSigma calibrate_sigma(const DepthImage& depth, const Camera& camera, const Table& table, const DepthSigma& prior) {
   const InversePlane plane = table_plane(table);
   std::vector<double> deviations;
   for (int v = 0; v < depth.height; v += 2) {

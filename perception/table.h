@@ -21,11 +21,11 @@ struct DepthSigma {
 };
 
 struct TableOptions {
-  DepthSigma sigma;            // first guess of the noise; the band is refined by the table's own residuals
-  double band = 3.0;           // sigmas; readings nearer to the plane than this belong to it
-  double min_share = 0.1;      // of the valid pixels that must lie on the plane
-  int min_inliers = 200;       // pixels that must lie on the plane
-  double max_depth = 8.0;      // metres; readings beyond are ignored
+  DepthSigma sigma;        // first guess of the noise; the band is refined by the table's own residuals
+  double band = 3.0;       // sigmas; readings nearer to the plane than this belong to it
+  double min_share = 0.1;  // of the valid pixels that must lie on the plane
+  int min_inliers = 200;   // pixels that must lie on the plane
+  double max_depth = 8.0;  // metres; readings beyond are ignored
   int max_ransac_points = 6000;
   int ransac_iterations = 400;
 };
@@ -42,9 +42,9 @@ inline Eigen::Vector3d pixel_ray(const Camera& camera, double u, double v) {
 }
 
 // The table that most readings lie on: RANSAC in inverse depth (PCL), then weighted least squares inside a band that
-// follows sigma(z). nullopt if no plane holds enough readings, among them images without a valid reading; readings that are
-// not finite or not positive count as none. Throws std::invalid_argument if the image is not of the camera's size or
-// the camera has no focal length.
+// follows sigma(z). nullopt if no plane holds enough readings, among them images without a valid reading; readings that
+// are not finite or not positive count as none. Throws std::invalid_argument if the image is not of the camera's size
+// or the camera has no focal length.
 std::optional<Table> find_table(const DepthImage& depth, const Camera& camera, const TableOptions& options = {});
 
 // The table as an inverse plane. The camera must be above the table.
@@ -58,8 +58,8 @@ Table table_from_plane(const InversePlane& plane);
 DepthSigma calibrate_sigma(const DepthImage& depth, const Camera& camera, const Table& table,
                            const DepthSigma& prior = {});
 
-// How much the sensor bends a plane: root mean square, in `sigma`s, of the table's deviations averaged over small blocks
-// of pixels, beyond what independent noise leaves there. 0 if the table has too few whole blocks.
+// How much the sensor bends a plane: root mean square, in `sigma`s, of the table's deviations averaged over small
+// blocks of pixels, beyond what independent noise leaves there. 0 if the table has too few whole blocks.
 double measure_warp(const DepthImage& depth, const Camera& camera, const Table& table, const DepthSigma& sigma);
 
 // Throws std::invalid_argument unless the image has the camera's size and the camera has positive focal lengths.

@@ -10,19 +10,19 @@
 namespace dofusion {
 
 struct UnknownRecoveryOptions {
-  DepthSigma sigma;               // of the depth readings
-  bool calibrate = true;          // take `sigma` and `warp` from the scatter of the table's readings
-  double warp = 0.0;              // sigmas by which the sensor bends planes
-  int min_pixels = 30;            // with a reading; labels with fewer are left out
-  double min_size = 0.004;        // metres; an object is at least this high
-  double contact = 0.01;          // metres, with three sigmas: how deep an object's visible foot may lie below the top
-                                  // of what it stands on
-  double rests_on = 0.08;         // share of an object's readings that must lie above what it stands on
-  double balance = 0.004;         // metres; a centre of mass lies at least this far inside what carries it
-  double max_extension = 0.3;     // metres that a carrying object may be larger than seen, where that is hidden
-  double overlap = 5e-4;          // metres; neighbours that overlap deeper are cut apart
+  DepthSigma sigma;            // of the depth readings
+  bool calibrate = true;       // take `sigma` and `warp` from the scatter of the table's readings
+  double warp = 0.0;           // sigmas by which the sensor bends planes
+  int min_pixels = 30;         // with a reading; labels with fewer are left out
+  double min_size = 0.004;     // metres; an object is at least this high
+  double contact = 0.01;       // metres, with three sigmas: how deep an object's visible foot may lie below the top
+                               // of what it stands on
+  double rests_on = 0.08;      // share of an object's readings that must lie above what it stands on
+  double balance = 0.004;      // metres; a centre of mass lies at least this far inside what carries it
+  double max_extension = 0.3;  // metres that a carrying object may be larger than seen, where that is hidden
+  double overlap = 5e-4;       // metres; neighbours that overlap deeper are cut apart
   ShapeFitOptions shape;
-  FaceOptions faces;              // its sigma is set from the one above
+  FaceOptions faces;  // its sigma is set from the one above
 };
 
 // For each label from 2 up a closed convex mesh that shows what is seen of the object and reaches down to the table or

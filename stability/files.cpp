@@ -31,17 +31,22 @@ std::string read_file(const fs::path& path) {
 }
 
 void write_file(const fs::path& path, const std::string& bytes) {
-  const fs::path temporary = temporary_name(path);
+  // Devices, pipes and links (/dev/stdout is one) are written to, not replaced.
+  std::error_code unknown;
+  const fs::file_status status = fs::symlink_status(path, unknown);
+  const bool in_place = fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
+  const fs::path temporary = in_place ? path : temporary_name(path);
   {
     std::ofstream out(temporary, std::ios::binary);
     out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
     out.close();
     if (!out) {
       std::error_code ignored;
-      fs::remove(temporary, ignored);
+      if (!in_place) fs::remove(temporary, ignored);
       throw InputError(path.string() + ": cannot be written; does its folder exist and is it writable?");
     }
   }
+  if (in_place) return;
   std::error_code error;
   fs::rename(temporary, path, error);
   if (error) {
@@ -51,36 +56,48 @@ void write_file(const fs::path& path, const std::string& bytes) {
   }
 }
 
-OutputDirectory::OutputDirectory(const fs::path& target)
-    : target_(fs::absolute(target).lexically_normal()), temporary_(temporary_name(target_)) {
+OutputDirectory::OutputDirectory(const fs::path& target) : target_(fs::absolute(target).lexically_normal()) {
+  if (target.empty()) throw InputError("the output directory has an empty name");
+  if (target_.filename().empty()) target_ = target_.parent_path();  // "out/" names the folder out
   std::error_code error;
-  if (fs::exists(target_, error) && !fs::is_directory(target_, error)) {
+  const bool there = fs::exists(target_, error);
+  if (there && !fs::is_directory(target_, error)) {
     throw InputError(target.string() + ": is a file; --out needs a directory");
   }
+  // Inside a target that is there: it may be writable where its parent is not, or be another file system.
+  temporary_ = there ? temporary_name(target_ / "dofusion") : temporary_name(target_);
+  for (fs::path p = temporary_; !fs::exists(p, error) && p.has_relative_path(); p = p.parent_path()) made_.push_back(p);
+  fs::remove_all(temporary_, error);  // left by a process that was killed
   fs::create_directories(temporary_, error);
-  if (error) throw InputError(target.string() + ": cannot be created (" + error.message() + ")");
+  if (error) {
+    remove_made();
+    throw InputError(target.string() + ": cannot be created (" + error.message() + ")");
+  }
 }
 
 OutputDirectory::~OutputDirectory() {
+  if (!temporary_.empty()) remove_made();
+}
+
+void OutputDirectory::remove_made() {
   std::error_code ignored;
-  if (!temporary_.empty()) fs::remove_all(temporary_, ignored);
+  fs::remove_all(temporary_, ignored);
+  for (const fs::path& folder : made_) fs::remove(folder, ignored);  // fails on one that others have used since
 }
 
 void OutputDirectory::commit() {
-  const fs::path target = target_.filename().empty() ? target_.parent_path() : target_;
   std::error_code error;
-  if (!fs::exists(target)) {
-    fs::rename(temporary_, target, error);
+  if (!fs::exists(target_, error)) {
+    fs::rename(temporary_, target_, error);
   } else {
     // Entry by entry: what else the user keeps in that directory stays.
-    for (const fs::directory_entry& entry : fs::directory_iterator(temporary_)) {
-      const fs::path place = target / entry.path().filename();
-      if (entry.is_directory()) fs::remove_all(place, error);
-      if (!error) fs::rename(entry.path(), place, error);
-      if (error) break;
+    for (fs::directory_iterator entry(temporary_, error), end; !error && entry != end; entry.increment(error)) {
+      const fs::path place = target_ / entry->path().filename();
+      if (entry->is_directory()) fs::remove_all(place, error);
+      if (!error) fs::rename(entry->path(), place, error);
     }
   }
-  if (error) throw InputError(target.string() + ": cannot be written (" + error.message() + ")");
+  if (error) throw InputError(target_.string() + ": cannot be written (" + error.message() + ")");
   fs::remove_all(temporary_, error);
   temporary_.clear();
 }

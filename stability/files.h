@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace dofusion {
 
@@ -16,12 +17,14 @@ class InputError : public std::runtime_error {
 // The file's bytes. Throws InputError naming the file if it cannot be read.
 std::string read_file(const std::filesystem::path& path);
 
-// Writes `bytes` under a temporary name beside `path` and renames it. Throws InputError if that is not possible.
+// Writes `bytes` under a temporary name beside `path` and renames it; a device, pipe or link is written to as it is.
+// Throws InputError if that is not possible.
 void write_file(const std::filesystem::path& path, const std::string& bytes);
 
 // A directory of results that appears whole: fill `path()`, then `commit()` moves it to the target. Where the target
 // exists already, entries of the same name are replaced and others are left alone. Without commit the temporary
-// directory is removed. The constructor throws InputError if the target cannot be written or is a file.
+// directory is removed, and so are the folders above it that were made for it. The constructor throws InputError if the
+// target cannot be written or is a file.
 class OutputDirectory {
  public:
   explicit OutputDirectory(const std::filesystem::path& target);
@@ -32,7 +35,9 @@ class OutputDirectory {
   void commit();
 
  private:
+  void remove_made();
   std::filesystem::path target_, temporary_;
+  std::vector<std::filesystem::path> made_;  // the temporary directory and what was made above it, innermost first
 };
 
 }  // namespace dofusion

@@ -1,14 +1,15 @@
 #include "apps/study.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "apps/assets.h"
+#include "apps/study_figures.h"
 #include "apps/study_report.h"
 #include "stability/files.h"
 #include "tests/temporary_directory.h"
@@ -85,7 +86,8 @@ TEST(StudyConfig, DefaultsAndOwnValues) {
 
   const StudyConfig own = study_config_from_json(
       R"({"sensor": "kinect2", "noise_scales": [0.5, 3], "distance_m": 1, "known": false, "samples": 16, "steps": 20,
-          "tasks": [{"task": "stack", "objects": 3}], "model": "m.safetensors"})", "study.json");
+          "tasks": [{"task": "stack", "objects": 3}], "model": "m.safetensors"})",
+      "study.json");
   EXPECT_EQ(own.sensor, SensorModel::kKinect2);
   EXPECT_EQ(own.noise_scales, (std::vector<double>{0.5, 3}));
   EXPECT_EQ(own.distance_m, 1.0);

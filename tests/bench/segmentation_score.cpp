@@ -1,7 +1,7 @@
 // Scores table, segmentation and model-free recovery on real frames with labels, or on synthetic scans.
 //
-//   segmentation_score --real DIR --first 0 --last 24      DIR holds camera.json, learn<N>_depth.png, learn<N>_label.png
-//   segmentation_score --synthetic 100 --objects 2 --task unstructured --sensor realsense --seed 1
+//   segmentation_score --real DIR --first 0 --last 24      DIR holds camera.json, learn<N>_depth.png,
+//   learn<N>_label.png segmentation_score --synthetic 100 --objects 2 --task unstructured --sensor realsense --seed 1
 
 #include <chrono>
 #include <cstdio>
@@ -43,7 +43,7 @@ struct Row {
 struct Frame {
   DepthImage depth;
   LabelImage truth;
-  Scene scene;                               // the true one, in `T_world_camera`'s world; empty for real frames
+  Scene scene;  // the true one, in `T_world_camera`'s world; empty for real frames
   Pose T_world_camera = Pose::Identity();
 };
 
@@ -119,10 +119,13 @@ void report(const std::vector<Row>& rows) {
     milliseconds.push_back(row.milliseconds);
     iou.insert(iou.end(), row.volume_iou.begin(), row.volume_iou.end());
     right += row.score.found == row.score.true_objects;
-    still += row.plausible.status == SettleStatus::kSettled && row.plausible.moved_pct < 5.0 && row.plausible.moved_deg < 5.0;
+    still += row.plausible.status == SettleStatus::kSettled && row.plausible.moved_pct < 5.0 &&
+             row.plausible.moved_deg < 5.0;
   }
-  std::printf("%zu frames: number of objects right in %d, overlap F %.4f, boundary F %.4f, moved < 5 %% and 5 deg in %d, "
-              "%.0f ms a frame\n", rows.size(), right, mean(overlap), mean(boundary), still, mean(milliseconds));
+  std::printf(
+      "%zu frames: number of objects right in %d, overlap F %.4f, boundary F %.4f, moved < 5 %% and 5 deg in %d, "
+      "%.0f ms a frame\n",
+      rows.size(), right, mean(overlap), mean(boundary), still, mean(milliseconds));
   if (!iou.empty()) {
     std::printf("volume IoU of %zu recovered objects: mean %.3f, median %.3f\n", iou.size(), mean(iou), median(iou));
   }

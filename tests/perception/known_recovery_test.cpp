@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <string>
 
 #include <gtest/gtest.h>
 
@@ -42,6 +43,15 @@ SeenScene see(const Scene& truth, double noise_scale, std::uint64_t seed, int th
     object.T_world_object = view.T_world_camera * table->T_world_camera.inverse() * object.T_world_object;
   }
   return seen;
+}
+
+std::string names_of(const SeenScene& seen) {
+  std::string names;
+  for (const RecoveredObject& found : seen.found) {
+    names += found.name + " (label " + std::to_string(found.label) + ", " + std::to_string(found.pixels) +
+             " pixels, score " + std::to_string(found.score) + ") ";
+  }
+  return names;
 }
 
 // The recovered object nearest to the true one has its shape and pose, up to the shape's symmetries.
@@ -87,7 +97,7 @@ TEST(KnownRecovery, EveryBlockInEveryRest) {
       scene.objects = {object};
       scene.T_world_object = {resting_at(model, rest, 0.02, -0.01, 0.0, uniform(rng, 0.0, 2.0 * M_PI))};
       const SeenScene seen = see(scene, 0.0, ++seed);
-      ASSERT_EQ(seen.found.size(), 1u);
+      ASSERT_EQ(seen.found.size(), 1u) << names_of(seen);
       expect_found(seen, 0, 1e-3, 1.0 * kDegree);
     }
   }

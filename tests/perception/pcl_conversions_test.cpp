@@ -12,8 +12,9 @@ namespace {
 const Pose kView = look_at({0.1, -0.55, 0.5}, {0.0, 0.0, 0.03});
 
 BoxImage two_boxes() {
-  return render_boxes({upright_box({0.1, 0.06, 0.08}, {-0.09, 0, 0.04}, 0.3), upright_box({0.06, 0.06, 0.12}, {0.09, 0.02, 0.06}, 0.9)},
-                      test_camera(), kView, {0.0, 1.7e-3}, 9);
+  return render_boxes(
+      {upright_box({0.1, 0.06, 0.08}, {-0.09, 0, 0.04}, 0.3), upright_box({0.06, 0.06, 0.12}, {0.09, 0.02, 0.06}, 0.9)},
+      test_camera(), kView, {0.0, 1.7e-3}, 9);
 }
 
 TEST(PclConversions, AnOrganisedCloudGivesImageAndCameraBack) {

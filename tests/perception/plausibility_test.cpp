@@ -22,7 +22,8 @@ TEST(Plausibility, OverlapsArePushedApartGently) {
   EXPECT_EQ(result.status, SettleStatus::kSettled);
   EXPECT_LT(result.moved_pct, 5.0);
   EXPECT_LT(result.moved_deg, 2.0);
-  EXPECT_GT((result.scene.T_world_object[1].translation() - result.scene.T_world_object[0].translation()).norm(), 0.0495);
+  EXPECT_GT((result.scene.T_world_object[1].translation() - result.scene.T_world_object[0].translation()).norm(),
+            0.0495);
 }
 
 TEST(Plausibility, WhatFallsIsReported) {

@@ -40,7 +40,8 @@ class RealFrames : public testing::Test {
     }
   }
   void SetUp() override {
-    if (results_.empty()) GTEST_SKIP() << "no real frames in " << kFrames << " (PointCloudLibrary/data, segmentation/mOSD)";
+    if (results_.empty())
+      GTEST_SKIP() << "no real frames in " << kFrames << " (PointCloudLibrary/data, segmentation/mOSD)";
   }
   static std::vector<FrameResult> results_;
 };

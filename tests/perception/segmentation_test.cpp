@@ -24,25 +24,29 @@ OverlapScore score(const std::vector<TriangleMesh>& meshes) {
 constexpr double kOverlap = 0.95;
 
 TEST(Segmentation, PartsBoxesThatStandApart) {
-  const OverlapScore s = score({upright_box({0.1, 0.06, 0.08}, {-0.09, 0, 0.04}, 0.3), upright_box({0.06, 0.06, 0.12}, {0.09, 0.02, 0.06}, 0.9)});
+  const OverlapScore s = score({upright_box({0.1, 0.06, 0.08}, {-0.09, 0, 0.04}, 0.3),
+                                upright_box({0.06, 0.06, 0.12}, {0.09, 0.02, 0.06}, 0.9)});
   EXPECT_EQ(s.found, 2);
   EXPECT_GT(s.overlap_f, kOverlap);
 }
 
 TEST(Segmentation, PartsABoxFromTheOneItStandsOn) {
-  const OverlapScore s = score({upright_box({0.2, 0.16, 0.05}, {0, 0, 0.025}, 0.2), upright_box({0.07, 0.07, 0.08}, {0, 0, 0.09}, 0.7)});
+  const OverlapScore s =
+      score({upright_box({0.2, 0.16, 0.05}, {0, 0, 0.025}, 0.2), upright_box({0.07, 0.07, 0.08}, {0, 0, 0.09}, 0.7)});
   EXPECT_EQ(s.found, 2);
   EXPECT_GT(s.overlap_f, kOverlap);
 }
 
 TEST(Segmentation, PartsABoxFromTheWallItTouches) {
-  const OverlapScore s = score({upright_box({0.24, 0.06, 0.15}, {0, 0.1, 0.075}, 0.0), upright_box({0.08, 0.08, 0.07}, {0, 0.03, 0.035}, 0.0)});
+  const OverlapScore s = score(
+      {upright_box({0.24, 0.06, 0.15}, {0, 0.1, 0.075}, 0.0), upright_box({0.08, 0.08, 0.07}, {0, 0.03, 0.035}, 0.0)});
   EXPECT_EQ(s.found, 2);
   EXPECT_GT(s.overlap_f, kOverlap);
 }
 
 TEST(Segmentation, JoinsABoxBehindAnother) {
-  const OverlapScore s = score({upright_box({0.26, 0.06, 0.1}, {0, 0.08, 0.05}, 0.0), upright_box({0.05, 0.05, 0.2}, {0.02, -0.06, 0.1}, 0.5)});
+  const OverlapScore s = score(
+      {upright_box({0.26, 0.06, 0.1}, {0, 0.08, 0.05}, 0.0), upright_box({0.05, 0.05, 0.2}, {0.02, -0.06, 0.1}, 0.5)});
   EXPECT_EQ(s.found, 2);
   EXPECT_GT(s.overlap_f, kOverlap);
 }
@@ -67,7 +71,9 @@ TEST(Segmentation, SurvivesImagesWithoutReadings) {
 }
 
 TEST(Segmentation, FollowsAUsersMask) {
-  const BoxImage image = render_boxes({upright_box({0.1, 0.06, 0.08}, {-0.09, 0, 0.04}, 0.3), upright_box({0.06, 0.06, 0.12}, {0.09, 0.02, 0.06}, 0.9)}, test_camera(), kView, kSigma, 6);
+  const BoxImage image = render_boxes(
+      {upright_box({0.1, 0.06, 0.08}, {-0.09, 0, 0.04}, 0.3), upright_box({0.06, 0.06, 0.12}, {0.09, 0.02, 0.06}, 0.9)},
+      test_camera(), kView, kSigma, 6);
   const std::optional<Table> table = find_table(image.depth, test_camera());
   ASSERT_TRUE(table);
   LabelImage mask(image.labels.width, image.labels.height, 0);

@@ -13,7 +13,8 @@ const Pose kView = look_at({0.1, -0.6, 0.5}, {0.0, 0.0, 0.0});
 
 TEST(Table, IsFoundWhereItIs) {
   const DepthSigma sigma{0.0, 1.7e-3};
-  const BoxImage image = render_boxes({upright_box({0.1, 0.06, 0.08}, {0, 0, 0.04}, 0.4)}, test_camera(), kView, sigma, 1);
+  const BoxImage image =
+      render_boxes({upright_box({0.1, 0.06, 0.08}, {0, 0, 0.04}, 0.4)}, test_camera(), kView, sigma, 1);
   const std::optional<Table> table = find_table(image.depth, test_camera());
   ASSERT_TRUE(table);
   // 60,000 readings with about 1 mm of noise: the plane is known to far better than 0.3 mm and 0.1 degrees.
@@ -29,9 +30,10 @@ TEST(Table, FrameFollowsTheOpticalAxisAndTheCamerasX) {
   const std::optional<Table> table = find_table(image.depth, test_camera());
   ASSERT_TRUE(table);
   const Eigen::Vector3d axis = table->T_world_camera.linear().col(2);
-  const Eigen::Vector3d foot = table->T_world_camera.translation() - axis * table->T_world_camera.translation().z() / axis.z();
-  EXPECT_LT(foot.norm(), 1e-4);                                                  // the optical axis meets the origin
-  EXPECT_NEAR(table->T_world_camera.linear()(1, 0), 0.0, 1e-6);                  // camera x in the world's x-z plane
+  const Eigen::Vector3d foot =
+      table->T_world_camera.translation() - axis * table->T_world_camera.translation().z() / axis.z();
+  EXPECT_LT(foot.norm(), 1e-4);                                  // the optical axis meets the origin
+  EXPECT_NEAR(table->T_world_camera.linear()(1, 0), 0.0, 1e-6);  // camera x in the world's x-z plane
   EXPECT_NEAR(table->T_world_camera.linear().determinant(), 1.0, 1e-9);
 }
 

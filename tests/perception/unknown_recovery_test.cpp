@@ -65,14 +65,16 @@ TEST(UnknownRecovery, AWedgeKeepsItsSlope) {
 }
 
 TEST(UnknownRecovery, StackedBoxesRestOnEachOther) {
-  const Recovered r = recover({upright_box({0.2, 0.16, 0.05}, {0, 0, 0.025}, 0.2), upright_box({0.07, 0.07, 0.08}, {0, 0, 0.09}, 0.7)});
+  const Recovered r =
+      recover({upright_box({0.2, 0.16, 0.05}, {0, 0, 0.025}, 0.2), upright_box({0.07, 0.07, 0.08}, {0, 0, 0.09}, 0.7)});
   ASSERT_EQ(r.objects.size(), 2U);
   EXPECT_NEAR(world_box(r.objects[0]).max.z(), 0.05, 0.002);
   EXPECT_NEAR(world_box(r.objects[1]).min.z(), world_box(r.objects[0]).max.z(), 2e-4);
 }
 
 TEST(UnknownRecovery, NeighboursDoNotOverlap) {
-  const Recovered r = recover({upright_box({0.24, 0.06, 0.15}, {0, 0.1, 0.075}, 0.0), upright_box({0.08, 0.08, 0.07}, {0, 0.03, 0.035}, 0.0)});
+  const Recovered r = recover(
+      {upright_box({0.24, 0.06, 0.15}, {0, 0.1, 0.075}, 0.0), upright_box({0.08, 0.08, 0.07}, {0, 0.03, 0.035}, 0.0)});
   ASSERT_EQ(r.objects.size(), 2U);
   std::vector<TriangleMesh> meshes;
   for (const RecoveredObject& object : r.objects) {
