@@ -4,7 +4,7 @@ set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cd "$root"
 bash apps/install_packages.sh
-cmake --preset release -DDOFUSION_TESTS=OFF >/dev/null
+cmake --preset release >/dev/null
 cmake --build --preset release --target dofusion-place
 ./build/release/bin/dofusion-place --depth assets/scans/two_blocks/depth.png \
   --camera assets/scans/two_blocks/camera.json --objects assets/blocks --query hat --out out/demo

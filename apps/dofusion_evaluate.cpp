@@ -40,6 +40,7 @@ int main(int argc, char** argv) {
   app.add_option("--json", json_path, "write the rows to this file");
 
   return run_program(app, argc, argv, [&] {
+    if (!json_path.empty()) check_writable(json_path);
 #ifdef DOFUSION_TORCH
     enable_torch_networks(sampler.threads);  // for models of the paper's preset
 #endif

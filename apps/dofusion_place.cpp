@@ -46,7 +46,9 @@ int main(int argc, char** argv) {
     arguments.placement.polish = !raw;
     Stopwatch watch;
     if (out.empty()) throw InputError("--out: the name of a folder is needed");
+    if (!json.empty()) check_writable(json);
     OutputDirectory output(out);  // an --out that cannot be written fails before the work
+    check_inputs_survive(arguments, out);
     const PlaceInputs inputs = load_inputs(arguments);
     const double load_ms = watch.lap_ms();
     PlaceResult result = run_placement(inputs, arguments);

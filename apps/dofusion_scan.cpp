@@ -116,6 +116,8 @@ int main(int argc, char** argv) {
     generation.seed = seed;
     if (split.empty() || split.find('/') != std::string::npos) throw InputError("--split: not a folder's name");
 
+    if (out.empty()) throw InputError("--out: the name of a folder is needed");
+    if (!json.empty()) check_writable(json);
     OutputDirectory directory(out);
     SceneDataset dataset =
         data.empty() ? generate_scenes(generation, count > 0 ? count : 10, threads) : read_dataset(data);

@@ -57,6 +57,7 @@ int main(int argc, char** argv) {
     job.partial = partial_file(out);
     // What cannot be written fails before the work.
     { const OutputDirectory writable(out); }
+    std::filesystem::create_directories(std::filesystem::absolute(job.partial).parent_path());
     if (!json.empty() && !std::filesystem::is_directory(std::filesystem::absolute(json).parent_path())) {
       throw InputError(json + ": cannot be written; its folder does not exist");
     }

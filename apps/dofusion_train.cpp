@@ -66,6 +66,10 @@ int main(int argc, char** argv) {
     if (!options.resume && std::filesystem::exists(options.out)) {
       throw InputError(options.out + ": exists already; --resume goes on with its training, another --out begins anew");
     }
+    if (options.resume && !std::filesystem::exists(options.out + ".checkpoint")) {
+      throw InputError(options.out + ".checkpoint: no such file; there is no training to go on with");
+    }
+    if (!json_path.empty()) check_writable(json_path);
     ModelConfig config = make_config(preset_from_string(preset));
     if (!config_path.empty()) config = config_from_json(read_file(config_path), config_path, config);
 #ifdef DOFUSION_TORCH

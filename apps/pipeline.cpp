@@ -1,5 +1,7 @@
 #include "apps/pipeline.h"
 
+#include <algorithm>
+
 #include "apps/stopwatch.h"
 #include "perception/known_recovery.h"
 #include "perception/plausibility.h"
@@ -18,6 +20,14 @@ LabelImage relabelled(const LabelImage& labels, const std::vector<RecoveredObjec
   LabelImage result = labels;
   for (std::uint8_t& label : result.pixels) label = new_label[label];
   return result;
+}
+
+// Recovery may have moved pixels between objects: what an object has is what the label image shows.
+void count_pixels(const LabelImage& labels, std::vector<RecoveredObject>& objects) {
+  for (RecoveredObject& object : objects) object.pixels = 0;
+  for (const std::uint8_t label : labels.pixels) {
+    if (label >= kLabelFirstObject) ++objects.at(static_cast<std::size_t>(label - kLabelFirstObject)).pixels;
+  }
 }
 
 }  // namespace
@@ -43,6 +53,7 @@ RecoveredScene recover_scene(const DepthImage& depth, const Camera& camera, cons
     result.objects = recover_known(depth, camera, *result.table, labels, options.library, known);
     result.labels = label_recovered(depth, camera, *result.table, labels, result.objects);
   }
+  count_pixels(result.labels, result.objects);
   const PlausibleScene plausible = make_plausible(to_scene(result.objects), options.physics);
   result.scene = plausible.scene;
   result.settled = plausible.status;
@@ -50,6 +61,8 @@ RecoveredScene recover_scene(const DepthImage& depth, const Camera& camera, cons
   result.moved_deg = plausible.moved_deg;
   for (std::size_t i = 0; i < result.objects.size(); ++i) {
     result.objects[i].label = kLabelFirstObject + static_cast<int>(i);
+    result.objects[i].pixels = static_cast<int>(
+        std::count(result.labels.pixels.begin(), result.labels.pixels.end(), kLabelFirstObject + i));
     result.objects[i].object = result.scene.objects[i];
     result.objects[i].T_world_object = result.scene.T_world_object[i];
   }

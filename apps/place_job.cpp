@@ -104,6 +104,17 @@ ObjectAndOffset load_query(const std::string& name_or_file, double unit) {
   return load_solid(name_or_file, unit, "--query-unit");
 }
 
+void check_inputs_survive(const PlaceArguments& arguments, const std::string& directory) {
+  for (const std::string& input : {arguments.depth, arguments.cloud, arguments.camera, arguments.mask, arguments.query,
+                                   arguments.objects, arguments.model}) {
+    for (const char* output : {"placements.json", "segmentation.png", "query.obj", "scene.xml", "report.html", "objects"}) {
+      std::error_code error;
+      if (input.empty() || !fs::equivalent(input, fs::path(directory) / output, error)) continue;
+      throw InputError(input + ": --out " + directory + " would write over it; choose another folder");
+    }
+  }
+}
+
 PlaceInputs load_inputs(const PlaceArguments& arguments) {
   PlaceInputs inputs;
   inputs.camera = read_camera(arguments.camera);
@@ -151,7 +162,10 @@ PlaceResult run_placement(const PlaceInputs& inputs, const PlaceArguments& argum
     return found == result.recovered.timing_ms.end() ? 0.0 : found->second;
   };
   result.timing_ms = {{"segment", recovered_ms("segment")}, {"recover", recovered_ms("recover")}};
-  if (!result.recovered.table) return result;
+  if (!result.recovered.table) {
+    for (const char* step : {"sdf", "sample", "settle"}) result.timing_ms.emplace_back(step, 0.0);
+    return result;
+  }
 
   Stopwatch watch;
   const Scene scene = with_distance_fields(result.recovered.scene);
@@ -188,7 +202,8 @@ std::string placements_json(const PlaceInputs& inputs, const PlaceArguments& arg
                                {"mesh", object_file(i)},
                                {"pixels", object.pixels}});
   }
-  json["recovered_scene_moved"] = {{"translational_displacement_pct", number_or_null(result.recovered.moved_pct)},
+  json["recovered_scene_moved"] = {{"status", to_string(result.recovered.settled)},
+                                   {"translational_displacement_pct", number_or_null(result.recovered.moved_pct)},
                                    {"rotational_displacement_deg", number_or_null(result.recovered.moved_deg)}};
   const Eigen::Vector3d& origin = inputs.query_origin;
   json["query"] = {{"name", inputs.query->name},
@@ -203,7 +218,7 @@ std::string placements_json(const PlaceInputs& inputs, const PlaceArguments& arg
          {"T_camera_query", matrix(T_world_camera.inverse() * placement.T_world_query)},
          {"stable", placement.stable},
          {"status", to_string(placement.status)},
-         {"robustness", placement.robustness},
+         {"robustness", placement.robustness ? nlohmann::json(*placement.robustness) : nlohmann::json()},
          {"translational_displacement_pct", number_or_null(placement.displacement.translation_pct)},
          {"rotational_displacement_deg", number_or_null(placement.displacement.rotation_deg)},
          {"penetration_m", placement.penetration}});

@@ -34,6 +34,9 @@ struct PlaceInputs {
 // Reads and checks everything; throws InputError naming the file or the argument and what is wrong.
 PlaceInputs load_inputs(const PlaceArguments& arguments);
 
+// Throws InputError if the outputs, written into `directory`, would replace one of the inputs.
+void check_inputs_survive(const PlaceArguments& arguments, const std::string& directory);
+
 // A block by name, or the solid of a mesh file. Throws InputError.
 ObjectAndOffset load_query(const std::string& name_or_file, double unit);
 

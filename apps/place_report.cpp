@@ -103,7 +103,7 @@ std::string placements_table(const PlaceResult& result) {
     const Eigen::Vector3d at = p.T_world_query.translation() * 1000.0;
     html += "<tr><td>" + std::to_string(i + 1) + "</td><td class=\"text\">" + verdict(p) + "</td><td>" +
             number(p.displacement.translation_pct) + "</td><td>" + number(p.displacement.rotation_deg) + "</td><td>" +
-            number(p.penetration * 1000.0) + "</td><td>" + (p.robustness > 0.0 ? number(100.0 * p.robustness, 0) + " %" : "–") +
+            number(p.penetration * 1000.0) + "</td><td>" + (p.robustness ? number(100.0 * *p.robustness, 0) + " %" : "–") +
             "</td><td>" + number(at.x(), 0) + ", " + number(at.y(), 0) + ", " + number(at.z(), 0) + "</td></tr>\n";
   }
   return html + "</table>\n";
@@ -168,7 +168,7 @@ std::string report_html(const PlaceInputs& inputs, const PlaceArguments& argumen
   if (!result.recovered.objects.empty()) {
     html += objects_table(result.recovered) + "<p class=\"soft\">To come to rest, the recovered objects moved by at most " +
             number(result.recovered.moved_pct) + " % of their diameter and " + number(result.recovered.moved_deg) +
-            " degrees.</p>\n";
+            " degrees (" + to_string(result.recovered.settled) + ").</p>\n";
   }
   if (!pictures.best.empty()) {
     html += "<h2>The best placements, as generated and as they settle</h2>\n<div class=\"pairs\">\n";

@@ -58,7 +58,8 @@ bool moves_less(const Placement& a, const Placement& b) {
 
 bool ranks_before(const Placement& a, const Placement& b) {
   if (a.stable != b.stable) return a.stable;
-  if (a.robustness != b.robustness) return a.robustness > b.robustness;
+  const double robust_a = a.robustness.value_or(0.0), robust_b = b.robustness.value_or(0.0);
+  if (robust_a != robust_b) return robust_a > robust_b;
   return movement(a) < movement(b);
 }
 

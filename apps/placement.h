@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "diffusion/sampler.h"
@@ -31,7 +32,7 @@ struct Placement {
   bool stable = false;                 // settled, and nothing moved more than 10 % and 10°
   Displacement displacement;           // the largest over all objects; infinite if the simulation diverged
   double penetration = 0.0;            // metres, deepest overlap before settling
-  double robustness = 0.0;             // share of the disturbed trials that were stable; 0 if not tried
+  std::optional<double> robustness;    // share of the disturbed trials that were stable; none if not tried
   std::vector<Pose> settled;           // context first, the query last
 };
 

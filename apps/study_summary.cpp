@@ -1,5 +1,6 @@
 #include "apps/study_summary.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -138,7 +139,8 @@ StudySummary summarise(const std::vector<StudyRow>& rows, const StudyConfig& con
   for (const double scale : config.noise_scales) {
     Rows chosen;
     for (const StudyRow& row : rows) {
-      if (row.noise_scale == scale) chosen.push_back(row);
+      // By what the file says of the scale, which is rounded.
+      if (std::abs(row.noise_scale - scale) <= 1e-5 * std::max(1.0, scale)) chosen.push_back(row);
     }
     if (!chosen.empty()) summary.points.push_back(point_of(chosen, scale, config, rng));
   }

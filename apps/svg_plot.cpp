@@ -11,7 +11,7 @@ namespace dofusion {
 namespace {
 
 constexpr double kWidth = 960.0, kLegendRow = 22.0, kTop = 12.0, kTitle = 26.0, kPlotHeight = 300.0;
-constexpr double kLeftMargin = 76.0, kRightMargin = 14.0, kBottomMargin = 64.0, kCaptionRow = 18.0;
+constexpr double kLeftMargin = 80.0, kRightMargin = 14.0, kBottomMargin = 64.0, kCaptionRow = 18.0;
 constexpr double kAside = 8.0;  // between the curves of a panel
 constexpr const char* kInk = "#222222";
 constexpr const char* kGrid = "#dddddd";
@@ -82,7 +82,7 @@ std::string draw_axes(const Frame& f) {
   svg += line(f.left, f.bottom, f.right, f.bottom, stroke(kInk, 1.2));
   svg += line(f.left, f.top, f.left, f.bottom, stroke(kInk, 1.2));
   svg += text((f.left + f.right) / 2.0, f.bottom + 55.0, f.panel.x.title, "middle");
-  const double x = f.left - 60.0, y = (f.top + f.bottom) / 2.0;
+  const double x = f.left - 65.0, y = (f.top + f.bottom) / 2.0;
   svg += text(x, y, f.panel.y.title, "middle", format("transform=\"rotate(-90 %.1f %.1f)\"", x, y).c_str());
   svg += text(f.left, f.top - 10.0, f.panel.title, "start", "class=\"title\"");
   return svg;
@@ -258,7 +258,7 @@ std::string draw_figure(const std::vector<PlotPanel>& panels, const std::vector<
     svg += draw_panel({panels[i], left + kLeftMargin, top, left + share - kRightMargin, bottom});
   }
   for (std::size_t i = 0; i < caption.size(); ++i) {
-    svg += text(kLeftMargin - 60.0, caption_top + kCaptionRow * static_cast<double>(i), caption[i], "start",
+    svg += text(kLeftMargin - 65.0, caption_top + kCaptionRow * static_cast<double>(i), caption[i], "start",
                 "class=\"soft\"");
   }
   return svg + "</svg>\n";

@@ -112,8 +112,8 @@ std::vector<Candidate> find_candidates(const std::vector<ObjectModel>& models, c
                                        const Pose& T_world_camera, const CandidateOptions& options) {
   std::vector<PoseHypothesis> hypotheses;
   const HypothesisOptions guessing;
-  add_resting_hypotheses(models, target, camera, T_world_camera, support_heights(models, scene.objects),
-                         guessing, hypotheses);
+  add_resting_hypotheses(models, target, camera, T_world_camera, support_heights(models, scene.objects), guessing,
+                         hypotheses);
   add_face_hypotheses(models, target, guessing, hypotheses);
   add_face_pair_hypotheses(models, target, guessing, hypotheses);
 
@@ -126,9 +126,8 @@ std::vector<Candidate> find_candidates(const std::vector<ObjectModel>& models, c
   };
   Level coarse = level(pyramid.coarse, scene.coarse, 6.0), medium = level(pyramid.medium, scene.medium, 3.0),
         fine = level(pyramid.fine, scene.fine, 1.0);
-  improve_all(candidates, options.threads, [&](int worker, Candidate& candidate) {
-    candidate.gain = coarse.gain(worker, candidate.placed);
-  });
+  improve_all(candidates, options.threads,
+              [&](int worker, Candidate& candidate) { candidate.gain = coarse.gain(worker, candidate.placed); });
   candidates = best_distinct(std::move(candidates), models, options.coarse_kept, options.coarse_kept / 16);
   improve_all(candidates, options.threads, [&](int worker, Candidate& candidate) {
     coarse.align_and_climb(worker, {3, 0.02, 0.01}, {0.004, 0.002, 1}, candidate);
@@ -147,9 +146,8 @@ std::vector<Candidate> find_candidates(const std::vector<ObjectModel>& models, c
 bool alike(const ObjectModel& model, const Pose& a, const Pose& b, double distance, double angle) {
   if ((a.translation() - b.translation()).norm() > distance) return false;
   const Eigen::Matrix3d R = a.linear().transpose() * b.linear();
-  return std::any_of(model.symmetries.begin(), model.symmetries.end(), [&](const Eigen::Matrix3d& symmetry) {
-    return rotation_angle(R * symmetry) < angle;
-  });
+  return std::any_of(model.symmetries.begin(), model.symmetries.end(),
+                     [&](const Eigen::Matrix3d& symmetry) { return rotation_angle(R * symmetry) < angle; });
 }
 
 }  // namespace dofusion

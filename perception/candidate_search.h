@@ -33,10 +33,10 @@ struct Candidate {
 
 struct CandidateOptions {
   int threads = 1;
-  int coarse_kept = 240;  // hypotheses that are aligned
-  int medium_kept = 48;   // … and climbed
-  int fine_kept = 12;     // … and returned; more if objects would be missing
-  double penetration = 0.0005;   // metres, one sigma; on the coarser levels more
+  int coarse_kept = 240;        // hypotheses that are aligned
+  int medium_kept = 48;         // … and climbed
+  int fine_kept = 12;           // … and returned; more if objects would be missing
+  double penetration = 0.0005;  // metres, one sigma; on the coarser levels more
 };
 
 // Guesses from the target, scored coarsely; the best are aligned, climbed and scored exactly. The best first, no two

@@ -15,8 +15,7 @@ double penetration_cost(const std::vector<ObjectModel>& models, const PlacedObje
   const ObjectModel& model = models[object.model];
   double cost = 0.5 * squared(std::min(0.0, lowest_point(model, object.T_world_object)) / sigma);
   for (const PlacedObject& other : others) {
-    cost += 0.5 * squared(
-                      overlap(model, object.T_world_object, models[other.model], other.T_world_object) / sigma);
+    cost += 0.5 * squared(overlap(model, object.T_world_object, models[other.model], other.T_world_object) / sigma);
   }
   return cost;
 }
@@ -26,14 +25,13 @@ double floating_cost(const std::vector<ObjectModel>& models, const PlacedObject&
   double gap = lowest_point(models[object.model], object.T_world_object);
   for (const PlacedObject& other : others) {
     if (gap <= 0.0) return 0.0;
-    gap = std::min(gap, clearance(models[object.model], object.T_world_object, models[other.model],
-                                  other.T_world_object));
+    gap = std::min(gap,
+                   clearance(models[object.model], object.T_world_object, models[other.model], other.T_world_object));
   }
   return std::min(300.0, 0.5 * squared(std::max(0.0, gap) / sigma));
 }
 
-std::vector<double> support_heights(const std::vector<ObjectModel>& models,
-                                    const std::vector<PlacedObject>& objects) {
+std::vector<double> support_heights(const std::vector<ObjectModel>& models, const std::vector<PlacedObject>& objects) {
   std::vector<double> heights = {0.0};
   for (const PlacedObject& object : objects) {
     for (const PlanarFace& face : models[object.model].faces) {

@@ -95,8 +95,7 @@ void DepthRaster::fill_triangle(const Eigen::Vector3i& triangle, std::int32_t in
   const double at_origin = n.z() / d - per_u * camera_.cx - per_v * camera_.cy;
 
   const int row_low = std::max(patch_.v0, static_cast<int>(std::ceil(std::min({a.v, b.v, c.v}))));
-  const int row_high =
-      std::min(patch_.v0 + patch_.height - 1, static_cast<int>(std::floor(std::max({a.v, b.v, c.v}))));
+  const int row_high = std::min(patch_.v0 + patch_.height - 1, static_cast<int>(std::floor(std::max({a.v, b.v, c.v}))));
   for (int row = row_low; row <= row_high; ++row) {
     Span span;
     add_crossing(a.u, a.v, b.u, b.v, row, span);

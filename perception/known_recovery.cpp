@@ -11,8 +11,8 @@
 namespace dofusion {
 namespace {
 
-constexpr int kWindowMargin = 24;         // pixels around a cluster: free space that must stay free
-constexpr double kCoarsePixels = 100.0;   // of the library's smallest object on the coarse level, about
+constexpr int kWindowMargin = 24;        // pixels around a cluster: free space that must stay free
+constexpr double kCoarsePixels = 100.0;  // of the library's smallest object on the coarse level, about
 
 SceneSearchOptions search_options(const KnownRecoveryOptions& options) {
   SceneSearchOptions search;
@@ -93,8 +93,7 @@ int coarse_stride(const std::vector<ObjectModel>& models, const Camera& camera,
   return std::clamp(static_cast<int>(std::lround(side_px / std::sqrt(kCoarsePixels))), 1, 8);
 }
 
-FaceMap object_faces(const DepthImage& depth, const Camera& camera, const LabelImage& labels,
-                     const DepthSigma& sigma) {
+FaceMap object_faces(const DepthImage& depth, const Camera& camera, const LabelImage& labels, const DepthSigma& sigma) {
   Image<std::uint8_t> mask(labels.width, labels.height, 0);
   for (std::size_t i = 0; i < mask.pixels.size(); ++i) mask.pixels[i] = labels.pixels[i] >= kLabelFirstObject;
   FaceOptions options;
@@ -122,7 +121,7 @@ double explained_share(const Observation& seen, const Explanation& scene, int la
   for (std::size_t i = 0; i < seen.labels.pixels.size(); ++i) {
     if (seen.labels.pixels[i] != label || seen.depth.pixels[i] <= 0.0f) continue;
     ++readings;
-    explained += scene.cost.pixels[i] < 4.5f;
+    explained += scene.cost.pixels[i] < kExplainedCost;
   }
   return explained / std::max(1.0, 0.0 + readings);
 }
@@ -189,6 +188,9 @@ std::vector<RecoveredObject> recover_known(const DepthImage& depth, const Camera
     cluster.window = window_of(labels, own);
     cluster.pyramid = observe_pyramid(depth, camera, table, labels, cluster.window, sigma,
                                       coarse_stride(models, camera, points.at(own.front()), table.T_world_camera));
+    for (Observation* level : {&cluster.pyramid.coarse, &cluster.pyramid.medium, &cluster.pyramid.fine}) {
+      ignore_labels(cluster.other_labels, *level);
+    }
     const std::vector<SceneHypothesis> scenes = search_scenes(models, cluster, search);
     const SceneHypothesis chosen = options.settle ? choose_settled(models, cluster, scenes, search.costs,
                                                                    {options.settle_distance, options.settle_angle})
@@ -203,8 +205,8 @@ std::vector<RecoveredObject> recover_known(const DepthImage& depth, const Camera
   return recovered;
 }
 
-LabelImage label_recovered(const DepthImage& depth, const Camera& camera, const Table& table,
-                           const LabelImage& labels, const std::vector<RecoveredObject>& objects) {
+LabelImage label_recovered(const DepthImage& depth, const Camera& camera, const Table& table, const LabelImage& labels,
+                           const std::vector<RecoveredObject>& objects) {
   check_image_size(depth.width, depth.height, camera);
   check_image_size(labels.width, labels.height, camera);
   LabelImage result = labels;

@@ -10,14 +10,14 @@ namespace dofusion {
 
 struct KnownRecoveryOptions {
   int threads = 1;
-  DepthSigma sigma;               // of the readings; scaled to what the table's own readings scatter
-  double cluster_distance = 0.05; // metres between readings of objects that are searched for jointly
-  int beam = 6;                   // partial scenes that are kept where adding object by object leaves something over
-  int fewest_pixels = 40;         // that an object must show
-  double min_score = 0.75;        // an object that explains less is not believed
-  bool settle = true;             // let the recovered scene come to rest in physics
-  double settle_distance = 0.006; // metres, and
-  double settle_angle = 0.1;      // radians that settling may move an object; else its seen pose is kept
+  DepthSigma sigma;                // of the readings; scaled to what the table's own readings scatter
+  double cluster_distance = 0.08;  // metres between readings of objects that are searched for jointly
+  int beam = 6;                    // partial scenes that are kept where adding object by object leaves something over
+  int fewest_pixels = 40;          // that an object must show
+  double min_score = 0.75;         // an object that explains less is not believed
+  bool settle = true;              // let the recovered scene come to rest in physics
+  double settle_distance = 0.006;  // metres, and
+  double settle_angle = 0.1;       // radians that settling may move an object; else its seen pose is kept
 };
 
 // For every object seen, the library's object and the pose that explain the image best. Poses are hypothesised from
@@ -27,15 +27,15 @@ struct KnownRecoveryOptions {
 // is left out, with its label unused. The result is sorted by label, then by pixels. `pixels` counts the readings that
 // the object explains to 3 sigma; `score` is their share of the readings where the object is in view, times the
 // share of its label's readings that the whole scene explains; `label` is 0 for an object that the segmentation has
-// missed. An empty list if there is no label above 1. Throws std::invalid_argument if an image is not of the camera's size or the library is
-// empty.
+// missed. An empty list if there is no label above 1. Throws std::invalid_argument if an image is not of the camera's
+// size or the library is empty.
 std::vector<RecoveredObject> recover_known(const DepthImage& depth, const Camera& camera, const Table& table,
                                            const LabelImage& labels, const std::vector<ObjectPtr>& library,
                                            const KnownRecoveryOptions& options = {});
 
 // Labels in the order of the recovered objects (2 + i for object i) where the image shows them: clusters that hold
 // several objects are split, parts of one object joined. Labels of objects that were not recovered become 0.
-LabelImage label_recovered(const DepthImage& depth, const Camera& camera, const Table& table,
-                           const LabelImage& labels, const std::vector<RecoveredObject>& objects);
+LabelImage label_recovered(const DepthImage& depth, const Camera& camera, const Table& table, const LabelImage& labels,
+                           const std::vector<RecoveredObject>& objects);
 
 }  // namespace dofusion

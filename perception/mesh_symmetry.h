@@ -16,10 +16,10 @@ std::vector<Eigen::Matrix3d> rotation_symmetries(const TriangleMesh& mesh, doubl
 
 // A flat part of the surface.
 struct PlanarFace {
-  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();    // outward, unit
-  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();   // metres
-  std::vector<Eigen::Vector3d> corners;                 // of its triangles, each once, in no order
-  double area = 0.0;                                    // square metres
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();   // outward, unit
+  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  // metres
+  std::vector<Eigen::Vector3d> corners;                // of its triangles, each once, in no order
+  double area = 0.0;                                   // square metres
 };
 
 // Triangles in one plane, joined; the largest first, at most `limit`, none smaller than 1 % of the surface.

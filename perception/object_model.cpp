@@ -22,8 +22,7 @@ std::vector<Eigen::Vector3d> make_probes(const Object& object) {
       const int pieces = static_cast<int>(std::ceil((b - a).norm() / spacing));
       for (int i = 1; i < pieces; ++i) probes.push_back(a + (b - a) * i / pieces);
     }
-    probes.push_back(
-        (mesh.vertices[triangle[0]] + mesh.vertices[triangle[1]] + mesh.vertices[triangle[2]]) / 3.0);
+    probes.push_back((mesh.vertices[triangle[0]] + mesh.vertices[triangle[1]] + mesh.vertices[triangle[2]]) / 3.0);
   }
   if (probes.size() <= kMostProbes) return probes;
   std::vector<Eigen::Vector3d> chosen;

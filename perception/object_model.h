@@ -20,14 +20,14 @@ struct ObjectModel {
   explicit ObjectModel(const ObjectPtr& object);
 
   ObjectPtr object;
-  std::vector<Eigen::Matrix3d> symmetries;  // the identity first
-  std::vector<PlanarFace> faces;            // all large ones
-  std::vector<PlanarFace> distinct;         // one of each class
-  std::vector<DistinctRest> resting;        // one of each class
+  std::vector<Eigen::Matrix3d> symmetries;                      // the identity first
+  std::vector<PlanarFace> faces;                                // all large ones
+  std::vector<PlanarFace> distinct;                             // one of each class
+  std::vector<DistinctRest> resting;                            // one of each class
   std::vector<std::pair<Eigen::Vector3d, double>> half_spaces;  // n·p <= d, of a convex object; else empty
-  std::vector<Eigen::Vector3d> probes;      // points on the surface, corners and edges first
+  std::vector<Eigen::Vector3d> probes;                          // points on the surface, corners and edges first
   MeshDistance distance;
-  double radius = 0.0;                      // metres from the origin to the farthest vertex
+  double radius = 0.0;  // metres from the origin to the farthest vertex
 };
 
 // Metres from one object's surface to the other's, negative if they overlap (then about how deep). Probes decide, so

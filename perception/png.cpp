@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <stdexcept>
 #include <vector>
+
+#include <zlib.h>
 
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -96,12 +99,55 @@ PngHeader check_png(const std::string& bytes, const std::string& path) {
   return header;
 }
 
+namespace {
+
+// A decoder that meets a short or damaged stream prints to stderr; so the rows are looked at first. True if the
+// image data inflate to whole rows that begin with one of the five filters. Interlaced images have other rows; of
+// these only the stream is checked.
+bool has_whole_rows(const std::string& bytes) {
+  std::size_t row_bytes = 0, rows = 0;
+  bool interlaced = false;
+  z_stream stream{};
+  if (inflateInit(&stream) != Z_OK) return false;
+  const std::unique_ptr<z_stream, int (*)(z_stream*)> end(&stream, inflateEnd);
+  std::vector<unsigned char> row;
+  int status = Z_OK;
+  for (std::size_t at = kSignatureSize; at + kChunkOverhead <= bytes.size() && status == Z_OK;) {
+    const std::size_t length = big_endian(bytes, at);
+    const std::string type = bytes.substr(at + 4, 4);
+    if (type == "IHDR") {
+      const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(bytes[at + 8 + k]); };
+      const std::size_t bits = std::size_t{byte(8)} * static_cast<std::size_t>(channels_of(byte(9)));
+      row_bytes = 1 + (std::size_t{big_endian(bytes, at + 8)} * bits + 7) / 8;
+      interlaced = byte(12) != 0;
+      row.resize(row_bytes);
+      stream.next_out = row.data();
+      stream.avail_out = static_cast<unsigned>(row_bytes);
+    } else if (type == "IDAT") {
+      stream.next_in = reinterpret_cast<unsigned char*>(const_cast<char*>(&bytes[at + 8]));
+      stream.avail_in = static_cast<unsigned>(length);
+      while (status == Z_OK && stream.avail_in > 0) {
+        status = inflate(&stream, Z_NO_FLUSH);
+        if (stream.avail_out > 0) continue;
+        if (!interlaced && row[0] > 4) return false;
+        ++rows;
+        stream.next_out = row.data();
+        stream.avail_out = static_cast<unsigned>(row_bytes);
+      }
+    }
+    at += length + kChunkOverhead;
+  }
+  return status == Z_STREAM_END && (interlaced || (rows == big_endian(bytes, kSignatureSize + 12) && stream.avail_out == row_bytes));
+}
+
+}  // namespace
+
 template <class T>
 void decode_grey_png(const std::string& bytes, const std::string& path, T* pixels, int width, int height) {
   const int type = sizeof(T) == 1 ? CV_8UC1 : CV_16UC1;
   cv::Mat image;
   try {
-    image = cv::imdecode(view(bytes.data(), static_cast<int>(bytes.size()), 1, CV_8UC1), cv::IMREAD_UNCHANGED);
+    if (has_whole_rows(bytes)) image = cv::imdecode(view(bytes.data(), static_cast<int>(bytes.size()), 1, CV_8UC1), cv::IMREAD_UNCHANGED);
   } catch (const cv::Exception&) {
     image.release();
   }

@@ -162,8 +162,8 @@ void add_resting_hypotheses(const std::vector<ObjectModel>& models, const Target
   }
 }
 
-void add_face_hypotheses(const std::vector<ObjectModel>& models, const Target& target,
-                         const HypothesisOptions& options, std::vector<PoseHypothesis>& hypotheses) {
+void add_face_hypotheses(const std::vector<ObjectModel>& models, const Target& target, const HypothesisOptions& options,
+                         std::vector<PoseHypothesis>& hypotheses) {
   for (const SeenFace& seen : target.faces) {
     for (std::size_t m = 0; m < models.size(); ++m) {
       for (const PlanarFace& face : models[m].distinct) {
@@ -174,8 +174,7 @@ void add_face_hypotheses(const std::vector<ObjectModel>& models, const Target& t
           const Eigen::Matrix3d R = so3_exp(seen.normal * (period * turn / turns)) * R0;
           const Eigen::Vector3d x = R * (face.corners[1] - face.corners[0]).normalized();
           const Eigen::Vector3d y = seen.normal.cross(x);
-          const Eigen::Vector3d out =
-              seen.normal * (seen.offset - face.normal.dot(face.centroid));
+          const Eigen::Vector3d out = seen.normal * (seen.offset - face.normal.dot(face.centroid));
           const Eigen::Vector3d x_object = R.transpose() * x, y_object = R.transpose() * y;
           for (const double along : shifts(extent_along(face.corners, x_object, 0.0),
                                            extent_along(seen.points, x, kOutliers), options.same_place)) {
@@ -208,8 +207,8 @@ void add_face_pair_hypotheses(const std::vector<ObjectModel>& models, const Targ
             planes << first.normal.transpose(), second.normal.transpose(), seen_frame.col(2).transpose();
             const Eigen::Vector3d edge = R.transpose() * seen_frame.col(2);
             for (const double along :
-                 shifts(extent_along(a.corners, edge, 0.0),
-                        extent_along(first.points, seen_frame.col(2), kOutliers), options.same_place)) {
+                 shifts(extent_along(a.corners, edge, 0.0), extent_along(first.points, seen_frame.col(2), kOutliers),
+                        options.same_place)) {
               const Eigen::Vector3d offsets(first.offset - a.normal.dot(a.centroid),
                                             second.offset - b.normal.dot(b.centroid), along);
               hypotheses.push_back({static_cast<int>(m), make_pose(R, planes.inverse() * offsets), Freedom::kFree});

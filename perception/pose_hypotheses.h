@@ -19,7 +19,7 @@ struct SeenFace {
 
 // Pixels that one more object is sought for.
 struct Target {
-  std::vector<SeenFace> faces;  // the largest first
+  std::vector<SeenFace> faces;                         // the largest first
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  // of the readings, world, metres
   Eigen::Vector2d min_px = Eigen::Vector2d::Zero();    // bounding box in the image, robust against stray pixels
   Eigen::Vector2d max_px = Eigen::Vector2d::Zero();
@@ -37,9 +37,9 @@ struct PoseHypothesis {
 };
 
 struct HypothesisOptions {
-  double turn_step = 0.26;      // radians between turns about a normal
-  double angle_match = 0.21;    // radians by which the angle between two seen faces may differ from the object's
-  double same_place = 0.004;    // metres; places nearer to each other are one guess
+  double turn_step = 0.26;    // radians between turns about a normal
+  double angle_match = 0.21;  // radians by which the angle between two seen faces may differ from the object's
+  double same_place = 0.004;  // metres; places nearer to each other are one guess
 };
 
 // Every object on every rest face at every yaw, on surfaces at the given heights (metres), placed so that its outline
@@ -49,8 +49,8 @@ void add_resting_hypotheses(const std::vector<ObjectModel>& models, const Target
                             const HypothesisOptions& options, std::vector<PoseHypothesis>& hypotheses);
 
 // Every face of every object put into every seen face's plane at every turn, centred or corner to corner.
-void add_face_hypotheses(const std::vector<ObjectModel>& models, const Target& target,
-                         const HypothesisOptions& options, std::vector<PoseHypothesis>& hypotheses);
+void add_face_hypotheses(const std::vector<ObjectModel>& models, const Target& target, const HypothesisOptions& options,
+                         std::vector<PoseHypothesis>& hypotheses);
 
 // Every pair of an object's faces that includes the same angle as a pair of seen faces: that fixes the rotation and
 // all but one coordinate of the position.

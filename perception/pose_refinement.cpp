@@ -52,7 +52,7 @@ NormalEquations depth_equations(PoseScorer& scorer, const Explanation& scene, co
       const Eigen::Vector3d arm = R_world_camera * (ray * z - T_camera_object.translation());
       Vector6d J;
       J << slope, arm.cross(slope);
-      const double weight = 2.0 * seen.precision.at(v, u);
+      const double weight = 1.0 / (seen.variance.at(v, u) + kExactness * kExactness / (facing * facing));
       sums.H.selfadjointView<Eigen::Lower>().rankUpdate(J, weight);
       sums.g += weight * (reading - z) * J;
     }
@@ -108,8 +108,8 @@ ScoredPose climb(const PoseObjective& objective, const Pose& start, Freedom free
       for (int k = 0; k < B.cols(); ++k) {
         for (const double sign : {1.0, -1.0}) {
           const Vector6d direction = sign * step * B.col(k);
-          const ScoredPose candidate{
-              moved(best.T_world_object, direction.head<3>(), direction.tail<3>() / radius), 0.0};
+          const ScoredPose candidate{moved(best.T_world_object, direction.head<3>(), direction.tail<3>() / radius),
+                                     0.0};
           const double score = objective(candidate.T_world_object);
           if (score <= best.score) continue;
           best = {candidate.T_world_object, score};

@@ -23,8 +23,8 @@ Pose align_to_readings(PoseScorer& scorer, const Explanation& scene, const Trian
                        Freedom freedom, const AlignOptions& options = {});
 
 struct ClimbOptions {
-  double first_step = 0.004;    // metres; rotations step so that the object's rim moves as far
-  double last_step = 0.00025;   // metres
+  double first_step = 0.004;   // metres; rotations step so that the object's rim moves as far
+  double last_step = 0.00025;  // metres
   int rounds_per_step = 3;
 };
 

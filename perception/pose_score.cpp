@@ -6,8 +6,8 @@
 namespace dofusion {
 namespace {
 
-constexpr float kNoTable = 1e3f;  // metres; depth of a pixel whose ray misses the table
-constexpr double kFloor = 2e-4;      // metres; no mesh and no pose is better than this, however exact the sensor
+constexpr float kNoTable = 1e3f;    // metres; depth of a pixel whose ray misses the table
+constexpr float kNoReading = 1e6f;  // variance that makes every difference count nothing
 
 float table_depth(const Camera& camera, const Pose& T_world_camera, double u, double v) {
   const double fall = (T_world_camera.linear() * unproject(camera, u, v, 1.0)).z();
@@ -26,11 +26,14 @@ Pixels<N> load(const float* values) {
 
 // What readings cost under a surface at the depth `scene` that faces the camera by the cosine `facing`.
 template <int N>
-Pixels<N> reading_cost(const Pixels<N>& reading, const Pixels<N>& missing, const Pixels<N>& precision,
+Pixels<N> reading_cost(const Pixels<N>& reading, const Pixels<N>& missing, const Pixels<N>& variance,
                        const Pixels<N>& scene, const Pixels<N>& facing) {
   const Pixels<N> behind = (reading - scene).max(0.0f), nearer = (reading - scene).min(0.0f);
   const Pixels<N> faces_camera =
       ((facing - kGrazingCosine) * (1.0f / (kFacingCosine - kGrazingCosine))).max(0.0f).min(1.0f);
+  // A surface that is off by kExactness across itself is off by so much more along a grazing ray.
+  const Pixels<N> off = kExactness * facing.max(0.01f).inverse();
+  const Pixels<N> precision = (2.0f * (variance + off * off)).inverse();
   return (behind * behind * precision).min(kBehindCost) + (nearer * nearer * precision).min(kNearerCost) +
          missing * faces_camera * kMissingCost;
 }
@@ -38,7 +41,7 @@ Pixels<N> reading_cost(const Pixels<N>& reading, const Pixels<N>& missing, const
 float reading_cost_at(const Observation& seen, std::size_t pixel, float scene, float facing) {
   using One = Pixels<1>;
   return reading_cost<1>(One(seen.depth.pixels[pixel]), One(seen.missing.pixels[pixel]),
-                         One(seen.precision.pixels[pixel]), One(scene), One(facing))[0];
+                         One(seen.variance.pixels[pixel]), One(scene), One(facing))[0];
 }
 
 // By how much N pixels of a patch lower the cost of the scene; 0 where the scene is nearer.
@@ -48,7 +51,7 @@ Pixels<N> gain_of_pixels(const Observation& seen, const Explanation& scene, std:
   const Pixels<N> w = load<N>(&patch.inverse_depth[in_patch]);
   const Pixels<N> nearest = ((w * load<N>(&scene.depth.pixels[in_scene]) - 1.0f) * 1e7f).max(0.0f).min(1.0f);
   const Pixels<N> cost = reading_cost<N>(load<N>(&seen.depth.pixels[in_scene]), load<N>(&seen.missing.pixels[in_scene]),
-                                         load<N>(&seen.precision.pixels[in_scene]), w.max(1e-6f).inverse(),
+                                         load<N>(&seen.variance.pixels[in_scene]), w.max(1e-6f).inverse(),
                                          load<N>(&patch.facing[in_patch]));
   return nearest * (load<N>(&scene.cost.pixels[in_scene]) - cost);
 }
@@ -74,7 +77,7 @@ Observation observe(const DepthImage& depth, const Camera& camera, const Table& 
   seen.T_camera_world = table.T_world_camera.inverse();
   seen.table_facing = table_facing_at(seen.camera, table.T_world_camera);
   seen.depth = DepthImage(seen.camera.width, seen.camera.height, 0.0f);
-  seen.precision = Image<float>(seen.camera.width, seen.camera.height, 0.0f);
+  seen.variance = Image<float>(seen.camera.width, seen.camera.height, kNoReading);
   seen.missing = Image<float>(seen.camera.width, seen.camera.height, 1.0f);
   seen.background = DepthImage(seen.camera.width, seen.camera.height, kNoTable);
   seen.labels = LabelImage(seen.camera.width, seen.camera.height, kLabelNothing);
@@ -85,8 +88,8 @@ Observation observe(const DepthImage& depth, const Camera& camera, const Table& 
       const float z = depth.at(v, u);
       seen.depth.at(row, column) = is_valid_depth(z) ? z : 0.0f;
       if (seen.depth.at(row, column) > 0.0f) {
-        const double sigma = sigma_of(z) + kFloor;
-        seen.precision.at(row, column) = static_cast<float>(0.5 / (sigma * sigma));
+        const double sigma = sigma_of(z);
+        seen.variance.at(row, column) = static_cast<float>(sigma * sigma);
         seen.missing.at(row, column) = 0.0f;
         sigmas.push_back(sigma);
       }
@@ -101,6 +104,15 @@ Observation observe(const DepthImage& depth, const Camera& camera, const Table& 
   return seen;
 }
 
+void ignore_labels(const std::vector<std::uint8_t>& labels, Observation& observation) {
+  for (std::size_t i = 0; i < observation.labels.pixels.size(); ++i) {
+    if (std::find(labels.begin(), labels.end(), observation.labels.pixels[i]) == labels.end()) continue;
+    observation.depth.pixels[i] = 0.0f;
+    observation.variance.pixels[i] = kNoReading;
+    observation.missing.pixels[i] = 0.0f;
+  }
+}
+
 double total_cost(const Explanation& explanation) {
   double sum = 0.0;
   for (const float cost : explanation.cost.pixels) sum += cost;
@@ -112,8 +124,7 @@ Explanation PoseScorer::empty_scene() const {
   scene.depth = observation_->background;
   scene.cost = Image<float>(scene.depth.width, scene.depth.height);
   for (std::size_t i = 0; i < scene.depth.pixels.size(); ++i) {
-    scene.cost.pixels[i] =
-        reading_cost_at(*observation_, i, scene.depth.pixels[i], observation_->table_facing);
+    scene.cost.pixels[i] = reading_cost_at(*observation_, i, scene.depth.pixels[i], observation_->table_facing);
   }
   return scene;
 }
@@ -155,17 +166,17 @@ PixelCounts PoseScorer::count(const Explanation& scene, const TriangleMesh& mesh
   PixelCounts counts;
   for (int row = 0; row < patch.height; ++row) {
     for (int column = 0; column < patch.width; ++column) {
-      const float w = patch.inverse_depth[static_cast<std::size_t>(row) * patch.width + column];
-      const int v = patch.v0 + row, u = patch.u0 + column;
-      if (w <= 0.0f || 1.0f / w >= scene.depth.at(v, u)) continue;
-      const float reading = observation_->depth.at(v, u);
-      const float difference = reading - 1.0f / w;
+      const std::size_t i = static_cast<std::size_t>(row) * patch.width + column;
+      const std::size_t pixel = static_cast<std::size_t>(patch.v0 + row) * scene.depth.width + patch.u0 + column;
+      const float w = patch.inverse_depth[i];
+      if (w <= 0.0f || 1.0f / w >= scene.depth.pixels[pixel]) continue;
+      const float reading = observation_->depth.pixels[pixel];
       if (reading <= 0.0f) {
         ++counts.missing;
-      } else if (difference * difference * observation_->precision.at(v, u) < 4.5f) {
+      } else if (reading_cost_at(*observation_, pixel, 1.0f / w, patch.facing[i]) < kExplainedCost) {
         ++counts.explained;
       } else {
-        ++(difference < 0.0f ? counts.nearer : counts.behind);
+        ++(reading < 1.0f / w ? counts.nearer : counts.behind);
       }
     }
   }

@@ -19,12 +19,12 @@ struct PixelWindow {
 
 // What the camera saw in a window.
 struct Observation {
-  Camera camera;           // its pixels are the window's at the stride
+  Camera camera;  // its pixels are the window's at the stride
   Pose T_camera_world = Pose::Identity();
-  DepthImage depth;        // metres, 0 = no reading
-  Image<float> precision;  // 1 / (2 sigma^2), 0 without a reading
-  Image<float> missing;    // 1 without a reading, else 0
-  DepthImage background;   // z-depth of the bare table, a large number where the ray misses it
+  DepthImage depth;           // metres, 0 = no reading
+  Image<float> variance;      // sigma^2, square metres; very large without a reading
+  Image<float> missing;       // 1 without a reading, else 0
+  DepthImage background;      // z-depth of the bare table, a large number where the ray misses it
   double sigma = 0.0;         // metres, median of the readings' standard deviations
   float table_facing = 0.0f;  // cosine of the incidence on the table in the window's middle
   LabelImage labels;
@@ -33,17 +33,23 @@ struct Observation {
 Observation observe(const DepthImage& depth, const Camera& camera, const Table& table, const LabelImage& labels,
                     const PixelWindow& window, const DepthSigma& sigma);
 
+// Makes pixels with these labels say nothing, neither for nor against any pose.
+void ignore_labels(const std::vector<std::uint8_t>& labels, Observation& observation);
+
 // Pixels that see a scene: its z-depth and what each pixel's reading costs under it, the negative logarithm of a
-// likelihood with a floor: r^2 / (2 sigma^2), at most kNearerCost where the reading is nearer than the scene (there
-// is something else) and kBehindCost where it is farther (the camera looked through the scene). No reading costs
-// kMissingCost where the scene faces the camera and nothing on grazing faces, which sensors do not see. That is far
-// less than a likelihood would say: shadows and dark surfaces drop out, too.
+// likelihood with a floor: r^2 / (2 sigma^2) with a sigma that counts the noise and, across the surface, kExactness, at
+// most kNearerCost where the reading is nearer than the scene (there is something else) and kBehindCost where it is
+// farther (the camera looked through the scene). No reading costs kMissingCost where the scene faces the camera and
+// nothing on grazing faces, which sensors do not see. That is far less than a likelihood would say: shadows and dark
+// surfaces drop out, too.
 struct Explanation {
   DepthImage depth;
   Image<float> cost;
 };
+inline constexpr float kExactness = 0.0002f;  // metres; no mesh and no pose is better
 inline constexpr float kNearerCost = 6.0f;
 inline constexpr float kBehindCost = 9.0f;
+inline constexpr float kExplainedCost = 4.5f;  // of a reading 3 sigma off
 inline constexpr float kMissingCost = 0.7f;
 inline constexpr float kGrazingCosine = 0.25f;  // of the incidence: 75 degrees
 inline constexpr float kFacingCosine = 0.35f;   // 70 degrees; between the two a part of kMissingCost

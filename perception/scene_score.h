@@ -9,10 +9,10 @@ namespace dofusion {
 
 // In nats, the unit of the pixels' costs, or the sigmas that turn metres into nats.
 struct SceneCosts {
-  double object = 100.0;         // of every object
-  double resting_bonus = 15.0;   // what an object may lose by resting flat and still be taken to
-  double penetration = 0.0005;   // metres that objects may overlap by, one sigma
-  double floating = 0.001;       // metres between an object and what it should rest on, one sigma
+  double object = 100.0;        // of every object
+  double resting_bonus = 15.0;  // what an object may lose by resting flat and still be taken to
+  double penetration = 0.0005;  // metres that objects may overlap by, one sigma
+  double floating = 0.001;      // metres between an object and what it should rest on, one sigma
 };
 
 struct SceneHypothesis {

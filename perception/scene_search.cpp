@@ -67,7 +67,7 @@ std::vector<SceneHypothesis> of_various_shapes(const std::vector<SceneHypothesis
   return chosen;
 }
 
-// Leaves out the objects without which the scene scores better.
+// Leaves out the objects without which the scene scores better: others found later may explain their pixels.
 SceneHypothesis pruned(const std::vector<ObjectModel>& models, const Cluster& cluster, SceneHypothesis scene,
                        const SceneCosts& costs) {
   for (std::size_t i = scene.objects.size(); i-- > 0;) {
@@ -80,9 +80,8 @@ SceneHypothesis pruned(const std::vector<ObjectModel>& models, const Cluster& cl
 
 // Each object of the scene replaced by whatever else explains its place about as well or better. Returns the best
 // scene and adds its rivals, which physics may prefer, to `rivals`.
-SceneHypothesis improved_by_swaps(const std::vector<ObjectModel>& models, const Cluster& cluster,
-                                  SceneHypothesis scene, const SceneSearchOptions& options,
-                                  std::vector<SceneHypothesis>& rivals) {
+SceneHypothesis improved_by_swaps(const std::vector<ObjectModel>& models, const Cluster& cluster, SceneHypothesis scene,
+                                  const SceneSearchOptions& options, std::vector<SceneHypothesis>& rivals) {
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
     const std::vector<PlacedObject> others = without(scene.objects, i);
     const PyramidScene explained = explain(cluster.pyramid, models, others);
@@ -190,6 +189,7 @@ std::vector<SceneHypothesis> search_scenes(const std::vector<ObjectModel>& model
     if (more.front().score > scenes.front().score) improve_front(more);
     scenes.insert(scenes.end(), more.begin(), more.end());
   }
+  for (SceneHypothesis& scene : scenes) scene = pruned(models, cluster, scene, options.costs);
   return distinct_scenes(models, std::move(scenes), options.returned);
 }
 

@@ -9,11 +9,11 @@ namespace dofusion {
 
 struct SceneSearchOptions {
   int threads = 1;
-  int most_objects = 12;       // in one cluster
-  int beam = 6;                // partial scenes kept where one after the other does not explain all
-  int returned = 6;            // scenes
-  int branches = 7;            // objects tried on each of them, at most two poses of one
-  int fewest_pixels = 40;      // that stay unexplained before one more object is sought
+  int most_objects = 12;   // in one cluster
+  int beam = 6;            // partial scenes kept where one after the other does not explain all
+  int returned = 6;        // scenes
+  int branches = 7;        // objects tried on each of them, at most two poses of one
+  int fewest_pixels = 40;  // that stay unexplained before one more object is sought
   SceneCosts costs;
 };
 

@@ -8,9 +8,10 @@
 namespace dofusion {
 namespace {
 
-constexpr double kFallsOver = 150.0;   // nats: handicap of a scene that does not stand
-constexpr double kTimeLimit = 1.0;     // simulated seconds; what has hardly moved by then stands
-constexpr double kWorsePerPixel = 0.1; // nats that settling may cost for each pixel an object shows
+constexpr double kFallsOver = 150.0;    // nats: handicap of a scene that does not stand
+constexpr double kSettlingGain = 50.0;  // nats that settling may at most be hoped to win
+constexpr double kTimeLimit = 1.0;      // simulated seconds; what has hardly moved by then stands
+constexpr double kWorsePerPixel = 0.1;  // nats that settling may cost for each pixel an object shows
 
 int visible_pixels(const std::vector<ObjectModel>& models, const Cluster& cluster,
                    const std::vector<PlacedObject>& objects) {
@@ -59,11 +60,12 @@ SceneHypothesis choose_settled(const std::vector<ObjectModel>& models, const Clu
   SceneHypothesis best = scenes.front();
   double best_score = -1e300;
   for (const SceneHypothesis& seen : scenes) {
-    if (seen.objects.empty() || seen.score <= best_score) continue;
+    if (seen.objects.empty() || seen.score < best_score - kSettlingGain) continue;
     const Settled settled = settle(models, cluster, seen, costs, limits);
     const double allowed = kWorsePerPixel * visible_pixels(models, cluster, seen.objects);
     const bool accept = settled.stands && settled.scene.score >= seen.score - allowed;
-    const double score = accept ? std::max(seen.score, settled.scene.score) : seen.score - kFallsOver;
+    // Of scenes that look alike the settled poses tell more: the wrong shapes must move to stand.
+    const double score = accept ? settled.scene.score : seen.score - kFallsOver;
     if (score <= best_score) continue;
     best_score = score;
     best = accept ? settled.scene : seen;

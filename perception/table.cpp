@@ -157,19 +157,24 @@ std::optional<Table> find_table(const DepthImage& depth, const Camera& camera, c
 
 DepthSigma calibrate_sigma(const DepthImage& depth, const Camera& camera, const Table& table, const DepthSigma& prior) {
   const InversePlane plane = table_plane(table);
-  std::vector<double> deviations;
+  std::vector<double> all;
   for (int v = 0; v < depth.height; v += 2) {
     for (int u = 0; u < depth.width; u += 2) {
-      const double z = depth.at(v, u);
       if (!is_valid_depth(depth.at(v, u))) continue;
-      const double e = std::abs(deviation(z, pixel_ray(camera, u, v), plane, prior));
-      if (e < kNearTable) deviations.push_back(e);
+      all.push_back(std::abs(deviation(depth.at(v, u), pixel_ray(camera, u, v), plane, prior)));
     }
   }
-  if (deviations.size() < 50) return prior;
-  const auto middle = deviations.begin() + deviations.size() / 2;
-  std::nth_element(deviations.begin(), middle, deviations.end());
-  const double scale = std::clamp(*middle / 0.6745, 0.25, 4.0);
+  // A sensor far noisier than the prior scatters beyond the window; widen it until the window holds five sigmas.
+  double scale = 1.0;
+  for (int round = 0; round < 4; ++round) {
+    const double window = std::max(kNearTable, 5.0 * scale);
+    std::vector<double> deviations;
+    std::copy_if(all.begin(), all.end(), std::back_inserter(deviations), [&](double e) { return e < window; });
+    if (deviations.size() < 50) return prior;
+    const auto middle = deviations.begin() + static_cast<std::ptrdiff_t>(deviations.size() / 2);
+    std::nth_element(deviations.begin(), middle, deviations.end());
+    scale = std::clamp(*middle / 0.6745, 0.25, 16.0);
+  }
   return {prior.constant * scale, prior.quadratic * scale};
 }
 

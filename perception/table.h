@@ -53,8 +53,8 @@ InversePlane table_plane(const Table& table);
 // A table at the given inverse plane (world frame as defined at Table); inliers and residual are left 0.
 Table table_from_plane(const InversePlane& plane);
 
-// `prior` scaled so that the readings near the table scatter about it by one sigma (robust; between a quarter and four
-// times the prior). The prior itself if there are too few.
+// `prior` scaled so that the readings near the table scatter about it by one sigma (robust; between a quarter and
+// sixteen times the prior). The prior itself if there are too few.
 DepthSigma calibrate_sigma(const DepthImage& depth, const Camera& camera, const Table& table,
                            const DepthSigma& prior = {});
 

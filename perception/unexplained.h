@@ -14,8 +14,8 @@ struct Cluster {
   const FaceMap* face_map = nullptr;
   Camera camera;
   Pose T_world_camera = Pose::Identity();
-  PixelWindow window;                       // around its pixels, stride 1
-  std::vector<std::uint8_t> other_labels;   // labels of the segmentation that belong to other clusters
+  PixelWindow window;                      // around its pixels, stride 1
+  std::vector<std::uint8_t> other_labels;  // labels of the segmentation that belong to other clusters
   ObservationPyramid pyramid;
 };
 

@@ -17,6 +17,19 @@ fs::path temporary_name(const fs::path& target) {
   return parent / ("." + name.string() + ".tmp" + std::to_string(::getpid()));
 }
 
+// Moves every file below `from` to the same place below `to`. Files of the same name are replaced; whatever else the
+// user keeps there stays.
+void merge(const fs::path& from, const fs::path& to, std::error_code& error) {
+  for (fs::directory_iterator entry(from, error), end; !error && entry != end; entry.increment(error)) {
+    const fs::path place = to / entry->path().filename();
+    if (entry->is_directory() && fs::is_directory(place)) {
+      merge(entry->path(), place, error);
+    } else {
+      fs::rename(entry->path(), place, error);
+    }
+  }
+}
+
 }  // namespace
 
 std::string read_file(const fs::path& path) {
@@ -56,6 +69,18 @@ void write_file(const fs::path& path, const std::string& bytes) {
   }
 }
 
+void check_writable(const fs::path& path) {
+  std::error_code error;
+  if (fs::exists(path, error) && !fs::is_regular_file(path, error)) {
+    if (fs::is_directory(path, error)) throw InputError(path.string() + ": is a directory, not a file");
+    return;  // a device or a pipe
+  }
+  const fs::path probe = temporary_name(path);
+  const bool opened = std::ofstream(probe).is_open();
+  fs::remove(probe, error);
+  if (!opened) throw InputError(path.string() + ": cannot be written; does its folder exist and is it writable?");
+}
+
 OutputDirectory::OutputDirectory(const fs::path& target) : target_(fs::absolute(target).lexically_normal()) {
   if (target.empty()) throw InputError("the output directory has an empty name");
   if (target_.filename().empty()) target_ = target_.parent_path();  // "out/" names the folder out
@@ -90,12 +115,7 @@ void OutputDirectory::commit() {
   if (!fs::exists(target_, error)) {
     fs::rename(temporary_, target_, error);
   } else {
-    // Entry by entry: what else the user keeps in that directory stays.
-    for (fs::directory_iterator entry(temporary_, error), end; !error && entry != end; entry.increment(error)) {
-      const fs::path place = target_ / entry->path().filename();
-      if (entry->is_directory()) fs::remove_all(place, error);
-      if (!error) fs::rename(entry->path(), place, error);
-    }
+    merge(temporary_, target_, error);
   }
   if (error) throw InputError(target_.string() + ": cannot be written (" + error.message() + ")");
   fs::remove_all(temporary_, error);

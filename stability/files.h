@@ -21,6 +21,9 @@ std::string read_file(const std::filesystem::path& path);
 // Throws InputError if that is not possible.
 void write_file(const std::filesystem::path& path, const std::string& bytes);
 
+// Throws InputError, as write_file would, if `path` cannot be written; for a look before long work.
+void check_writable(const std::filesystem::path& path);
+
 // A directory of results that appears whole: fill `path()`, then `commit()` moves it to the target. Where the target
 // exists already, entries of the same name are replaced and others are left alone. Without commit the temporary
 // directory is removed, and so are the folders above it that were made for it. The constructor throws InputError if the

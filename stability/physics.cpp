@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <list>
 #include <map>
@@ -27,11 +29,18 @@ using DataPtr = std::unique_ptr<mjData, DataDeleter>;
 
 void ignore_warning(const char*) {}  // warnings are read from mjData; MuJoCo's own handler writes a log file
 
+// MuJoCo must not return from an error (its memory ran out), and its own handler waits for a key.
+void exit_on_error(const char* message) {
+  std::fprintf(stderr, "MuJoCo: %s\n", message);
+  std::_Exit(1);
+}
+
 ModelPtr compile(const std::string& mjcf) {
   // The XML reader keeps process-wide state.
   static std::mutex mutex;
   const std::lock_guard<std::mutex> lock(mutex);
   mju_user_warning = ignore_warning;
+  mju_user_error = exit_on_error;
   const auto vfs = std::make_unique<mjVFS>();
   mj_defaultVFS(vfs.get());
   const char* name = "scene.xml";
@@ -46,7 +55,9 @@ ModelPtr compile(const std::string& mjcf) {
   return model;
 }
 
+// Also where contacts were dropped for want of room: what follows from the rest would be a false verdict.
 bool diverged(const mjData* data) {
+  if (data->warning[mjWARN_CONTACTFULL].number > 0 || data->warning[mjWARN_CNSTRFULL].number > 0) return true;
   return data->warning[mjWARN_BADQPOS].number > 0 || data->warning[mjWARN_BADQVEL].number > 0 ||
          data->warning[mjWARN_BADQACC].number > 0;
 }

@@ -21,6 +21,7 @@ struct PhysicsOptions {
   double rest_turn = 1e-3;      // radians
 };
 
+// kDiverged: a state became infinite, or there were more contacts than MuJoCo had room for.
 enum class SettleStatus { kSettled, kTimeLimit, kDiverged };
 std::string to_string(SettleStatus status);
 

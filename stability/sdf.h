@@ -34,7 +34,7 @@ struct SdfGrid {
   std::vector<float> values;                         // (size.x * size.y * size.z), x fastest
 
   // Inside the grid the trilinear interpolation; outside, the value at the nearest point of the grid plus the
-  // distance to it, which is at least the true distance's lower bound and never below zero off the solid.
+  // distance to it: an upper bound of the true distance.
   double operator()(const Eigen::Vector3d& point) const;
 };
 

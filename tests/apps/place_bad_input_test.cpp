@@ -202,8 +202,8 @@ TEST_F(PlaceBadInputTest, FoldersMadeForTheOutputGoAgain) {
 }
 
 TEST_F(PlaceBadInputTest, JsonFile) {
-  write_scan(scan_of({}, camera_));
   expect_refused({"--json", file("none/x.json")}, {"none/x.json", "cannot be written"});
+  expect_refused({"--json", folder()}, {folder().string(), "directory"});
 }
 
 TEST_F(PlaceBadInputTest, Arguments) {

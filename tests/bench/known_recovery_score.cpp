@@ -96,8 +96,8 @@ ObjectError compare(const Object& truth, const Pose& T_true, const RecoveredObje
   error.translation = (T_true.translation() - recovered.T_world_object.translation()).norm();
   error.angle = std::numeric_limits<double>::infinity();
   for (const Eigen::Matrix3d& symmetry : rotation_symmetries(truth.mesh)) {
-    error.angle = std::min(
-        error.angle, rotation_angle(T_true.linear().transpose() * recovered.T_world_object.linear() * symmetry));
+    error.angle = std::min(error.angle,
+                           rotation_angle(T_true.linear().transpose() * recovered.T_world_object.linear() * symmetry));
   }
   const MeshDistance distance(truth.mesh);
   for (const Eigen::Vector3d& vertex : recovered.object->mesh.vertices) {
@@ -113,8 +113,8 @@ std::vector<ObjectError> errors_of(const Trial& trial) {
   std::vector<std::tuple<double, std::size_t, std::size_t>> pairs;
   for (std::size_t i = 0; i < errors.size(); ++i) {
     for (std::size_t j = 0; j < trial.recovered.size(); ++j) {
-      pairs.emplace_back((trial.truth.T_world_object[i].translation() -
-                          trial.recovered[j].T_world_object.translation()).norm(), i, j);
+      pairs.emplace_back(
+          (trial.truth.T_world_object[i].translation() - trial.recovered[j].T_world_object.translation()).norm(), i, j);
     }
   }
   std::sort(pairs.begin(), pairs.end());
@@ -192,13 +192,14 @@ struct Summary {
   }
 
   void print(const std::string& name) const {
-    std::printf("%-13s %4d scans %4d objects | shape right %5.1f %% | wrong count %2d | right shapes: translation "
-                "%.2f mm (p90 %.2f), rotation %.2f deg (p90 %.2f) | surface %.2f mm (p90 %.2f) | placement stands "
-                "%5.1f %% of %d | processor time %.0f ms (p90 %.0f)\n",
-                name.c_str(), scans, objects, 100.0 * right / objects, count_errors, percentile(translation_mm, 0.5),
-                percentile(translation_mm, 0.9), percentile(angle_deg, 0.5), percentile(angle_deg, 0.9),
-                percentile(surface_mm, 0.5), percentile(surface_mm, 0.9), 100.0 * transferred / std::max(1, transfers),
-                transfers, percentile(milliseconds, 0.5), percentile(milliseconds, 0.9));
+    std::printf(
+        "%-13s %4d scans %4d objects | shape right %5.1f %% | wrong count %2d | right shapes: translation "
+        "%.2f mm (p90 %.2f), rotation %.2f deg (p90 %.2f) | surface %.2f mm (p90 %.2f) | placement stands "
+        "%5.1f %% of %d | processor time %.0f ms (p90 %.0f)\n",
+        name.c_str(), scans, objects, 100.0 * right / objects, count_errors, percentile(translation_mm, 0.5),
+        percentile(translation_mm, 0.9), percentile(angle_deg, 0.5), percentile(angle_deg, 0.9),
+        percentile(surface_mm, 0.5), percentile(surface_mm, 0.9), 100.0 * transferred / std::max(1, transfers),
+        transfers, percentile(milliseconds, 0.5), percentile(milliseconds, 0.9));
   }
 };
 

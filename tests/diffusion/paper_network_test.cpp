@@ -8,6 +8,7 @@
 #include "diffusion/trainer.h"
 #include "diffusion/weights.h"
 #include "tests/diffusion/toy_scenes.h"
+#include "tests/temporary_directory.h"
 
 namespace dofusion {
 namespace {
@@ -26,16 +27,12 @@ class PaperNetworkTest : public testing::Test {
  protected:
   void SetUp() override {
     enable_torch_networks(1);
-    folder_ = std::filesystem::path(testing::TempDir()) / testing::UnitTest::GetInstance()->current_test_info()->name();
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
-    options_.out = (folder_ / "paper.safetensors").string();
+    options_.out = folder_ / "paper.safetensors";
     options_.batch = 32;
     options_.warm_up = 10;
     options_.steps = 8;
   }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-  std::filesystem::path folder_;
+  TemporaryDirectory folder_;
   TrainOptions options_;
 };
 
@@ -74,7 +71,7 @@ TEST_F(PaperNetworkTest, LossFallsAndItsModelSamples) {
 TEST_F(PaperNetworkTest, ResumedTrainingFollowsTheSameCurve) {
   const TrainingSet data({boxes_on_table(50, 1)}, small_paper_config());
   const TrainResult whole = train(data, small_paper_config(), options_, "", {});
-  options_.out = (folder_ / "halves.safetensors").string();
+  options_.out = folder_ / "halves.safetensors";
   int steps = 0;
   const TrainResult first =
       train(data, small_paper_config(), options_, "", {}, [&](const TrainReport&) { return ++steps < 3; });

@@ -9,6 +9,7 @@
 #include "diffusion/weights.h"
 #include "stability/files.h"
 #include "tests/diffusion/toy_scenes.h"
+#include "tests/temporary_directory.h"
 
 namespace dofusion {
 namespace {
@@ -28,17 +29,12 @@ ModelConfig small_config() {
 class TrainerTest : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = std::filesystem::path(testing::TempDir()) / testing::UnitTest::GetInstance()->current_test_info()->name();
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
-    options_.out = (folder_ / "model.safetensors").string();
+    options_.out = folder_ / "model.safetensors";
     options_.batch = 16;
     options_.warm_up = 10;
     options_.steps = 12;
   }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
-  std::filesystem::path folder_;
+  TemporaryDirectory folder_;
   TrainOptions options_;
 };
 
@@ -48,7 +44,7 @@ TEST_F(TrainerTest, ResumedTrainingFollowsTheSameCurve) {
   ASSERT_TRUE(whole.finished);
   const std::vector<float> parameters = read_model(options_.out).parameters;
 
-  options_.out = (folder_ / "halves.safetensors").string();
+  options_.out = folder_ / "halves.safetensors";
   int steps = 0;
   const TrainResult first =
       train(data, small_config(), options_, "", {}, [&](const TrainReport&) { return ++steps < 5; });
@@ -95,7 +91,7 @@ TEST_F(TrainerTest, BadOutputAndBudgetAreRefused) {
   TrainOptions no_budget = options_;
   no_budget.steps = 0;
   EXPECT_THROW(train(data, small_config(), no_budget, "", {}), InputError);
-  options_.out = (folder_ / "missing" / "model.safetensors").string();
+  options_.out = folder_ / "missing/model.safetensors";
   EXPECT_THROW(train(data, small_config(), options_, "", {}), InputError);
 }
 

@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 
 #include "stability/files.h"
+#include "tests/temporary_directory.h"
 
 namespace dofusion {
 namespace {
@@ -38,9 +39,8 @@ class ModelFileTest : public testing::Test {
     config_.widths = {32};
     config_.embedding = 32;
     config_.hidden = 32;
-    path_ = (std::filesystem::path(testing::TempDir()) / "weights_test.safetensors").string();
+    path_ = folder_ / "model.safetensors";
   }
-  void TearDown() override { std::filesystem::remove(path_); }
   std::string read_error() {
     try {
       read_model(path_);
@@ -50,6 +50,7 @@ class ModelFileTest : public testing::Test {
     return "";
   }
   ModelConfig config_;
+  TemporaryDirectory folder_;
   std::string path_;
 };
 

@@ -13,9 +13,9 @@ namespace {
 // The rotation groups of the seven blocks, from geometry: cube, two square cuboids' (D4; 4 x 2 x 1 only D2), a
 // scalene, two isosceles prisms (C1, C2), a square pyramid (C4).
 TEST(MeshSymmetry, GroupsOfTheBlocks) {
-  const std::map<std::string, std::size_t> order = {{"cube", 24},        {"rectangle", 8},   {"half_rectangle", 4},
-                                                    {"tall_triangle", 1}, {"middle_triangle", 2}, {"tetrahedron", 4},
-                                                    {"hat", 2}};
+  const std::map<std::string, std::size_t> order = {
+      {"cube", 24},       {"rectangle", 8}, {"half_rectangle", 4}, {"tall_triangle", 1}, {"middle_triangle", 2},
+      {"tetrahedron", 4}, {"hat", 2}};
   for (const auto& [name, count] : order) {
     const TriangleMesh mesh = make_block(name)->mesh;
     const std::vector<Eigen::Matrix3d> symmetries = rotation_symmetries(mesh);
@@ -26,9 +26,13 @@ TEST(MeshSymmetry, GroupsOfTheBlocks) {
 }
 
 TEST(MeshSymmetry, FacesOfTheBlocks) {
-  const std::map<std::string, std::pair<std::size_t, std::size_t>> faces = {
-      {"cube", {6, 1}},            {"rectangle", {6, 2}},   {"half_rectangle", {6, 3}}, {"tall_triangle", {5, 5}},
-      {"middle_triangle", {5, 3}}, {"tetrahedron", {5, 2}}, {"hat", {5, 3}}};
+  const std::map<std::string, std::pair<std::size_t, std::size_t>> faces = {{"cube", {6, 1}},
+                                                                            {"rectangle", {6, 2}},
+                                                                            {"half_rectangle", {6, 3}},
+                                                                            {"tall_triangle", {5, 5}},
+                                                                            {"middle_triangle", {5, 3}},
+                                                                            {"tetrahedron", {5, 2}},
+                                                                            {"hat", {5, 3}}};
   for (const auto& [name, count] : faces) {
     const ObjectModel model(make_block(name));
     EXPECT_EQ(model.faces.size(), count.first) << name;

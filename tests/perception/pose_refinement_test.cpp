@@ -61,8 +61,8 @@ TEST(PoseRefinement, AlignmentFindsTheTruth) {
   CubeScene scene;
   PoseScorer scorer(scene.seen);
   const Pose start = moved(scene.T_world_cube, {0.003, -0.002, 0.002}, {0.03, -0.04, 0.05});
-  const Pose found = align_to_readings(scorer, scorer.empty_scene(), scene.cube->mesh, start, Freedom::kFree,
-                                       {25, 0.02, 0.002});
+  const Pose found =
+      align_to_readings(scorer, scorer.empty_scene(), scene.cube->mesh, start, Freedom::kFree, {25, 0.02, 0.002});
   EXPECT_LT((found.translation() - scene.T_world_cube.translation()).norm(), 1e-4);
   EXPECT_LT(rotation_angle(found.linear().transpose() * scene.T_world_cube.linear()), 2e-3);
 }

@@ -1,0 +1,72 @@
+// dofusion-scan as a user meets it.
+#include <filesystem>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "perception/depth_io.h"
+#include "stability/files.h"
+#include "tests/apps/run_command.h"
+#include "tests/temporary_directory.h"
+
+namespace dofusion {
+namespace {
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+std::vector<std::string> files_below(const std::string& folder) {
+  std::vector<std::string> names;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    if (entry.is_regular_file()) names.push_back(fs::relative(entry.path(), folder).string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+TEST(Scan, WritesABopDatasetThatTheSeedRepeats) {
+  const TemporaryDirectory directory;
+  const std::vector<std::string> common = {"--task", "stack", "--objects", "2",    "--count", "2", "--cameras", "2",
+                                           "--size", "160",   "120",       "--seed", "4"};
+  for (const auto& [out, threads] : {std::pair<const char*, const char*>{"a", "1"}, {"b", "2"}}) {
+    std::vector<std::string> arguments = common;
+    for (const std::string& word : {std::string("--threads"), std::string(threads), std::string("--json"),
+                                    directory / (std::string(out) + ".json"), std::string("--out"), directory / out}) {
+      arguments.push_back(word);
+    }
+    expect_success(run_command("dofusion-scan", arguments));
+  }
+  const std::vector<std::string> files = files_below(directory / "a");
+  EXPECT_EQ(files, files_below(directory / "b"));
+  for (const std::string& name : files) {
+    EXPECT_TRUE(read_file(directory / ("a/" + name)) == read_file(directory / ("b/" + name))) << name;
+  }
+  const json result = json::parse(read_file(directory / "a.json"));
+  EXPECT_EQ(result.at("scenes"), 2);
+  EXPECT_EQ(result.at("images"), 4);
+  const Camera camera = read_camera(directory / "a/camera.json");
+  EXPECT_EQ(camera.width, 160);
+  const DepthImage depth = read_depth(directory / "a/test/000001/depth/000001.png", camera);
+  int readings = 0;
+  for (const float z : depth.pixels) readings += z > 0.3F && z < 2.0F ? 1 : 0;
+  EXPECT_GT(readings, 160 * 120 / 2);  // a table 0.7 m away
+}
+
+TEST(Scan, BadInputIsRefusedAndLeavesNothing) {
+  const TemporaryDirectory directory;
+  const auto scan = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), {"--out", directory / "out"});
+    return run_command("dofusion-scan", arguments);
+  };
+  expect_refusal(scan({"--sensor", "lidar"}), {"lidar", "realsense"});
+  expect_refusal(scan({"--task", "heap"}), {"heap"});
+  expect_refusal(scan({"--split", "a/b"}), {"--split"});
+  expect_refusal(scan({"--objects", "9"}), {"9"});
+  expect_refusal(scan({"--data", directory / "none.h5"}), {"none.h5", "no such"});
+  write_file(directory / "bad.h5", "no HDF5 at all");
+  expect_refusal(scan({"--data", directory / "bad.h5"}), {"bad.h5"});
+  expect_refusal(run_command("dofusion-scan", {"--count", "1", "--out", "/proc/x"}), {"/proc/x"});
+  EXPECT_EQ(entries(directory.path()), std::vector<std::string>{"bad.h5"});
+}
+
+}  // namespace
+}  // namespace dofusion
