@@ -24,11 +24,18 @@ namespace {
 
 constexpr double kSmallest = 1e-3, kLargest = 10.0;  // metres, diameter; beyond, a unit is wrong
 
+constexpr std::size_t kMostTriangles = 100000;        // of a mesh: beyond, its physics takes minutes
+
 // The solid of a mesh file; `unit_option` is the argument that says its unit.
 ObjectAndOffset load_solid(const std::string& file, double unit, const std::string& unit_option) {
   ObjectAndOffset solid;
   try {
-    solid = make_object(fs::path(file).stem().string(), read_solid_mesh(file, unit));
+    const TriangleMesh mesh = read_solid_mesh(file, unit);
+    if (mesh.triangles.size() > kMostTriangles) {
+      throw InputError(file + ": a mesh of " + std::to_string(mesh.triangles.size()) + " triangles; simplify it to " +
+                       std::to_string(kMostTriangles) + " or fewer");
+    }
+    solid = make_object(fs::path(file).stem().string(), mesh);
   } catch (const std::invalid_argument& e) {
     throw InputError(file + ": " + e.what());
   }

@@ -12,6 +12,7 @@ namespace dofusion {
 namespace {
 
 constexpr int kWindowMargin = 24;        // pixels around a cluster: free space that must stay free
+constexpr float kSameSurface = 0.01f;    // metres between a reading and the object it shows
 constexpr double kCoarsePixels = 100.0;  // of the library's smallest object on the coarse level, about
 
 SceneSearchOptions search_options(const KnownRecoveryOptions& options) {
@@ -81,6 +82,21 @@ PixelWindow window_of(const LabelImage& labels, const std::vector<std::uint8_t>&
           1};
 }
 
+// All of a cluster but its faces and its pyramid.
+Cluster make_cluster(const DepthImage& depth, const Camera& camera, const Table& table, const LabelImage& labels,
+                     const std::map<int, std::vector<Eigen::Vector3d>>& points, const std::vector<std::uint8_t>& own) {
+  Cluster cluster;
+  cluster.depth = &depth;
+  cluster.camera = camera;
+  cluster.T_world_camera = table.T_world_camera;
+  cluster.window = window_of(labels, own);
+  for (const auto& [label, unused] : points) {
+    const bool is_own = std::find(own.begin(), own.end(), label) != own.end();
+    if (!is_own) cluster.other_labels.push_back(static_cast<std::uint8_t>(label));
+  }
+  return cluster;
+}
+
 // So coarse that a typical object of the library still covers some hundred pixels.
 int coarse_stride(const std::vector<ObjectModel>& models, const Camera& camera,
                   const std::vector<Eigen::Vector3d>& points, const Pose& T_world_camera) {
@@ -101,14 +117,15 @@ FaceMap object_faces(const DepthImage& depth, const Camera& camera, const LabelI
   return find_faces(depth, camera, mask, {}, options);
 }
 
-// The label that most of the pixels of a patch have.
-int common_label(const Cluster& cluster, const RasterPatch& patch) {
+// The label that most of the pixels have in which the patch is the nearest surface of its scene.
+int common_label(const Observation& seen, const Explanation& others, const RasterPatch& patch) {
   std::vector<int> votes(256, 0);
   for (int row = 0; row < patch.height; ++row) {
     for (int column = 0; column < patch.width; ++column) {
-      if (patch.inverse_depth[static_cast<std::size_t>(row) * patch.width + column] <= 0.0f) continue;
-      const int label = cluster.pyramid.fine.labels.at(patch.v0 + row, patch.u0 + column);
-      if (label >= kLabelFirstObject) ++votes[label];
+      const float w = patch.inverse_depth[static_cast<std::size_t>(row) * patch.width + column];
+      const int v = patch.v0 + row, u = patch.u0 + column;
+      const int label = seen.labels.at(v, u);
+      if (w * others.depth.at(v, u) > 1.0f && label >= kLabelFirstObject) ++votes[label];
     }
   }
   return static_cast<int>(std::max_element(votes.begin(), votes.end()) - votes.begin());
@@ -148,8 +165,8 @@ std::vector<RecoveredObject> report(const std::vector<ObjectModel>& models, cons
     object.name = model.object->name;
     object.known = true;
     object.pixels = counts.explained;
-    object.label = common_label(cluster, scorer.render(model.object->mesh, object.T_world_object));
-    object.score = counts.explained / std::max(1.0, 0.0 + counts.explained + counts.nearer + counts.behind);
+    object.label = common_label(scorer.observation(), others, scorer.render(model.object->mesh, object.T_world_object));
+    object.score = counts.explained / std::max(1.0, 0.0 + counts.explained + counts.behind);
     if (object.label > 0) object.score *= explained_share(cluster.pyramid.fine, scene, object.label);
     if (object.score < min_score) continue;
     result.push_back(object);
@@ -175,17 +192,8 @@ std::vector<RecoveredObject> recover_known(const DepthImage& depth, const Camera
   const SceneSearchOptions search = search_options(options);
   std::vector<RecoveredObject> recovered;
   for (const std::vector<std::uint8_t>& own : group_labels(points, options.cluster_distance)) {
-    Cluster cluster;
-    cluster.depth = &depth;
-    cluster.labels = &labels;
+    Cluster cluster = make_cluster(depth, camera, table, labels, points, own);
     cluster.face_map = &face_map;
-    cluster.camera = camera;
-    cluster.T_world_camera = table.T_world_camera;
-    for (const auto& [label, unused] : points) {
-      const bool is_own = std::find(own.begin(), own.end(), label) != own.end();
-      if (!is_own) cluster.other_labels.push_back(static_cast<std::uint8_t>(label));
-    }
-    cluster.window = window_of(labels, own);
     cluster.pyramid = observe_pyramid(depth, camera, table, labels, cluster.window, sigma,
                                       coarse_stride(models, camera, points.at(own.front()), table.T_world_camera));
     for (Observation* level : {&cluster.pyramid.coarse, &cluster.pyramid.medium, &cluster.pyramid.fine}) {
@@ -222,9 +230,9 @@ LabelImage label_recovered(const DepthImage& depth, const Camera& camera, const 
         const int v = patch.v0 + row, u = patch.u0 + column;
         if (w <= nearest.at(v, u)) continue;
         nearest.at(v, u) = w;
-        if (labels.at(v, u) >= kLabelFirstObject) {
-          result.at(v, u) = static_cast<std::uint8_t>(std::min<std::size_t>(255, kLabelFirstObject + i));
-        }
+        const bool agrees = std::abs(depth.at(v, u) - 1.0f / w) < kSameSurface;
+        if (!agrees || labels.at(v, u) == kLabelTable) continue;
+        result.at(v, u) = static_cast<std::uint8_t>(std::min<std::size_t>(255, kLabelFirstObject + i));
       }
     }
   }

@@ -25,16 +25,17 @@ struct KnownRecoveryOptions {
 // for objects that touch or hide each other, so that one label may hold several objects and several labels one. The
 // scene is then settled in physics: objects lie exactly on what supports them. What no object of the library explains
 // is left out, with its label unused. The result is sorted by label, then by pixels. `pixels` counts the readings that
-// the object explains to 3 sigma; `score` is their share of the readings where the object is in view, times the
-// share of its label's readings that the whole scene explains; `label` is 0 for an object that the segmentation has
-// missed. An empty list if there is no label above 1. Throws std::invalid_argument if an image is not of the camera's
-// size or the library is empty.
+// the object explains to 3 sigma; `score` is their share of the readings on or behind the object where it is in view,
+// times the share of its label's readings that the whole scene explains; `label` is 0 for an object that the
+// segmentation has missed. An empty list if there is no label above 1. Throws std::invalid_argument if an image is not
+// of the camera's size or the library is empty.
 std::vector<RecoveredObject> recover_known(const DepthImage& depth, const Camera& camera, const Table& table,
                                            const LabelImage& labels, const std::vector<ObjectPtr>& library,
                                            const KnownRecoveryOptions& options = {});
 
-// Labels in the order of the recovered objects (2 + i for object i) where the image shows them: clusters that hold
-// several objects are split, parts of one object joined. Labels of objects that were not recovered become 0.
+// Labels in the order of the recovered objects (2 + i for object i) where the reading is within 1 cm of what they would
+// show: clusters that hold several objects are split, parts of one object joined, and what segmentation missed is
+// there. The table keeps its label, and what no recovered object shows becomes 0.
 LabelImage label_recovered(const DepthImage& depth, const Camera& camera, const Table& table, const LabelImage& labels,
                            const std::vector<RecoveredObject>& objects);
 

@@ -25,45 +25,52 @@ double scene_score(const std::vector<ObjectModel>& models, const Cluster& cluste
   return -cost - total_cost(scene);
 }
 
+namespace {
+
+// The object aligned and climbed while the others stay.
+PlacedObject refined_object(const std::vector<ObjectModel>& models, PoseScorer& scorer,
+                            const std::vector<PlacedObject>& others, PlacedObject object, const SceneCosts& costs) {
+  const ObjectModel& model = models[object.model];
+  Explanation scene = scorer.empty_scene();
+  for (const PlacedObject& other : others) scorer.add(models[other.model].object->mesh, other.T_world_object, scene);
+  const PoseObjective objective = [&](const Pose& pose) {
+    const PlacedObject at{object.model, pose, object.freedom};
+    return scorer.gain(scene, model.object->mesh, pose) - penetration_cost(models, at, others, costs.penetration) -
+           floating_cost(models, at, others, costs.floating);
+  };
+  // At last only readings that the noise allows: others see another face, or pass the outline.
+  const double noise = 3.0 * scorer.observation().sigma;
+  const AlignOptions closing{4, std::max(0.003, noise), noise + 0.0005};
+  const Pose aligned =
+      align_to_readings(scorer, scene, model.object->mesh, object.T_world_object, object.freedom, closing);
+  if (objective(aligned) > objective(object.T_world_object)) object.T_world_object = aligned;
+  object.T_world_object =
+      climb(objective, object.T_world_object, object.freedom, model.radius, {0.001, 0.00025, 2}).T_world_object;
+  return object;
+}
+
+}  // namespace
+
 SceneHypothesis refine_jointly(const std::vector<ObjectModel>& models, const Cluster& cluster,
                                const SceneHypothesis& start, const SceneCosts& costs) {
   SceneHypothesis scene = start;
   scene.score = scene_score(models, cluster, scene.objects, true, costs);
   PoseScorer scorer(cluster.pyramid.fine);
-  // At last only readings that the noise allows: others see another face, or pass the outline.
-  const double noise = 3.0 * scorer.observation().sigma;
-  const AlignOptions closing{4, std::max(0.003, noise), noise + 0.0005};
   for (int round = 0; round < 2; ++round) {
     for (std::size_t i = 0; i < scene.objects.size(); ++i) {
       const std::vector<PlacedObject> others = without(scene.objects, i);
-      Explanation rest_of_scene = scorer.empty_scene();
-      for (const PlacedObject& other : others) {
-        scorer.add(models[other.model].object->mesh, other.T_world_object, rest_of_scene);
-      }
-      const ObjectModel& model = models[scene.objects[i].model];
-      const auto try_from = [&](PlacedObject object) {
-        const PoseObjective objective = [&](const Pose& pose) {
-          PlacedObject at = object;
-          at.T_world_object = pose;
-          return scorer.gain(rest_of_scene, model.object->mesh, pose) -
-                 penetration_cost(models, at, others, costs.penetration) -
-                 floating_cost(models, at, others, costs.floating);
-        };
-        const Pose aligned = align_to_readings(scorer, rest_of_scene, model.object->mesh, object.T_world_object,
-                                               object.freedom, closing);
-        if (objective(aligned) > objective(object.T_world_object)) object.T_world_object = aligned;
-        object.T_world_object =
-            climb(objective, object.T_world_object, object.freedom, model.radius, {0.001, 0.00025, 2}).T_world_object;
+      const auto try_from = [&](const PlacedObject& object) {
         SceneHypothesis changed = scene;
-        changed.objects[i] = object;
+        changed.objects[i] = refined_object(models, scorer, others, object, costs);
         changed.score = scene_score(models, cluster, changed.objects, true, costs);
         if (changed.score > scene.score) scene = changed;
       };
       try_from(scene.objects[i]);
-      if (scene.objects[i].freedom == Freedom::kResting) continue;
+      const PlacedObject& object = scene.objects[i];
+      if (object.freedom == Freedom::kResting) continue;
       const std::optional<Pose> flat =
-          laid_flat(model, scene.objects[i].T_world_object, support_heights(models, others));
-      if (flat) try_from({scene.objects[i].model, *flat, Freedom::kResting});
+          laid_flat(models[object.model], object.T_world_object, support_heights(models, others));
+      if (flat) try_from({object.model, *flat, Freedom::kResting});
     }
   }
   return scene;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "stability/physics.h"
 
@@ -58,11 +59,17 @@ SceneHypothesis choose_settled(const std::vector<ObjectModel>& models, const Clu
                                const std::vector<SceneHypothesis>& scenes, const SceneCosts& costs,
                                const SettleLimits& limits) {
   SceneHypothesis best = scenes.front();
-  double best_score = -1e300;
+  double best_score = -std::numeric_limits<double>::infinity();
   for (const SceneHypothesis& seen : scenes) {
     if (seen.objects.empty() || seen.score < best_score - kSettlingGain) continue;
-    const Settled settled = settle(models, cluster, seen, costs, limits);
     const double allowed = kWorsePerPixel * visible_pixels(models, cluster, seen.objects);
+    Settled settled = settle(models, cluster, seen, costs, limits);
+    if (settled.stands) {
+      // Physics leads out of the small local optima of the image; what it finds is worth another look.
+      const SceneHypothesis again = refine_jointly(models, cluster, settled.scene, costs);
+      const Settled resettled = settle(models, cluster, again, costs, limits);
+      if (resettled.stands && resettled.scene.score > settled.scene.score) settled = resettled;
+    }
     const bool accept = settled.stands && settled.scene.score >= seen.score - allowed;
     // Of scenes that look alike the settled poses tell more: the wrong shapes must move to stand.
     const double score = accept ? settled.scene.score : seen.score - kFallsOver;

@@ -10,7 +10,6 @@ namespace dofusion {
 // Everything about one cluster of objects that touch or hide each other.
 struct Cluster {
   const DepthImage* depth = nullptr;
-  const LabelImage* labels = nullptr;
   const FaceMap* face_map = nullptr;
   Camera camera;
   Pose T_world_camera = Pose::Identity();

@@ -81,8 +81,9 @@ void check_writable(const fs::path& path) {
   if (!opened) throw InputError(path.string() + ": cannot be written; does its folder exist and is it writable?");
 }
 
-OutputDirectory::OutputDirectory(const fs::path& target) : target_(fs::absolute(target).lexically_normal()) {
+OutputDirectory::OutputDirectory(const fs::path& target) {
   if (target.empty()) throw InputError("the output directory has an empty name");
+  target_ = fs::absolute(target).lexically_normal();
   if (target_.filename().empty()) target_ = target_.parent_path();  // "out/" names the folder out
   std::error_code error;
   const bool there = fs::exists(target_, error);

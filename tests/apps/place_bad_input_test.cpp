@@ -142,6 +142,21 @@ TEST_F(PlaceBadInputTest, QueryMesh) {
   expect_refused({"--query", file("m.obj"), "--query-unit", "0"}, {"--query-unit"});
 }
 
+TEST_F(PlaceBadInputTest, QueryMeshOfTooManyTriangles) {
+  std::string text;
+  for (int i = 0; i < 25001; ++i) {  // separate tetrahedra on a grid
+    const Eigen::Vector3d at(i % 160, i / 160, 0);
+    for (const Eigen::Vector3d& corner : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(0.5, 0, 0), Eigen::Vector3d(0, 0.5, 0),
+                                          Eigen::Vector3d(0, 0, 0.5)}) {
+      const Eigen::Vector3d v = at + corner;
+      text += "v " + std::to_string(v.x()) + " " + std::to_string(v.y()) + " " + std::to_string(v.z()) + "\n";
+    }
+    text += "f -4 -2 -3\nf -4 -3 -1\nf -4 -1 -2\nf -3 -2 -1\n";
+  }
+  write_file(file("m.obj"), text);
+  expect_refused({"--query", file("m.obj"), "--query-unit", "1e-3"}, {"m.obj", "100004 triangles", "simplify"});
+}
+
 TEST_F(PlaceBadInputTest, Objects) {
   expect_refused({"--objects", file("none")}, {"none", "folder"});
   expect_refused({"--objects", file("depth.png")}, {"depth.png", "folder"});

@@ -93,6 +93,16 @@ TEST(Simulator, ReportsInitialPenetration) {
   EXPECT_NEAR(simulator.settle({at(0, 0, 0.03)}).initial_penetration, 0.0, 1e-12);
 }
 
+TEST(Simulator, PenetrationOfTwoBoxesIsTheOverlapWhateverTouches) {
+  const Simulator cubes({make_block("cube"), make_block("cube")});
+  const double h = 0.025 * std::sqrt(2.0), overlap = 0.004;
+  const auto turned = [](const Eigen::Vector3d& w, double z) { return make_pose(so3_exp(w), {0.003, 0.002, z}); };
+  const Pose face = turned({0, 0, 0.3}, 0.2), edge_y = turned({0, M_PI / 4, 0}, 0.2);
+  EXPECT_NEAR(cubes.settle({face, turned({0, 0, 0.1}, 0.25 - overlap)}).initial_penetration, overlap, 1e-6);
+  EXPECT_NEAR(cubes.settle({face, turned({M_PI / 4, 0, 0}, 0.225 + h - overlap)}).initial_penetration, overlap, 1e-6);
+  EXPECT_NEAR(cubes.settle({edge_y, turned({M_PI / 4, 0, 0}, 0.2 + 2 * h - overlap)}).initial_penetration, overlap, 1e-6);
+}
+
 TEST(Simulator, RefusesWrongCountsAndBadPoses) {
   const Simulator simulator({make_block("cube")});
   EXPECT_THROW(simulator.settle({}), std::invalid_argument);
