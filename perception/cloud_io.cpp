@@ -79,6 +79,22 @@ bool has_sane_pcd_header(const std::string& path) {
   return in && unpacked == *points * *bytes && packed <= file_bytes;
 }
 
+// As above for a PLY: every element takes a byte at least.
+bool has_sane_ply_header(const std::string& path) {
+  constexpr int kMostLines = 1000;
+  const std::uint64_t file_bytes = std::filesystem::file_size(path);
+  std::ifstream in(path, std::ios::binary);
+  std::string line;
+  for (int k = 0; k < kMostLines && std::getline(in, line); ++k) {
+    std::istringstream words(line);
+    std::string keyword, name, count;
+    words >> keyword >> name >> count;
+    if (keyword == "end_header") return true;
+    if (keyword == "element" && whole_number(count).value_or(file_bytes + 1) > file_bytes) return false;
+  }
+  return false;
+}
+
 pcl::PointCloud<pcl::PointXYZ> read_cloud(const std::string& path) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) throw InputError(path + ": no such cloud file");
@@ -91,7 +107,7 @@ pcl::PointCloud<pcl::PointXYZ> read_cloud(const std::string& path) {
     if (extension == ".pcd") {
       if (has_sane_pcd_header(path)) status = pcl::PCDReader().read(path, cloud);
     } else if (extension == ".ply") {
-      status = pcl::PLYReader().read(path, cloud);
+      if (has_sane_ply_header(path)) status = pcl::PLYReader().read(path, cloud);
     } else {
       throw InputError(path + ": a cloud must be a .pcd or .ply file");
     }
