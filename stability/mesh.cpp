@@ -56,6 +56,19 @@ Eigen::Vector3d centre_of_mass(const TriangleMesh& mesh) {
   return reference + moment / total;
 }
 
+Eigen::Matrix3d inertia(const TriangleMesh& mesh) {
+  // The second moments of a tetrahedron with one corner at the origin: det / 120 (sum of the corners' outer products
+  // and of the outer product of their sum).
+  Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
+  for (const Eigen::Vector3i& t : mesh.triangles) {
+    const Eigen::Vector3d &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
+    const Eigen::Vector3d sum = a + b + c;
+    moments += a.dot(b.cross(c)) / 120.0 *
+               (a * a.transpose() + b * b.transpose() + c * c.transpose() + sum * sum.transpose());
+  }
+  return moments.trace() * Eigen::Matrix3d::Identity() - moments;
+}
+
 double diameter(const TriangleMesh& mesh) {
   double squared = 0.0;
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {

@@ -23,6 +23,7 @@ struct BoundingBox {
 
 double volume(const TriangleMesh& mesh);               // signed: negative if the mesh is inside out
 Eigen::Vector3d centre_of_mass(const TriangleMesh&);   // of the uniform solid; the mesh must have a volume
+Eigen::Matrix3d inertia(const TriangleMesh& mesh);      // about the origin, of the uniform solid at 1 kg/m3: kg m2
 double diameter(const TriangleMesh& mesh);             // largest distance between two vertices
 BoundingBox bounding_box(const TriangleMesh& mesh);    // throws std::invalid_argument without vertices
 double surface_area(const TriangleMesh& mesh);

@@ -88,4 +88,42 @@ TriangleMesh prism_mesh(const std::vector<Eigen::Vector2d>& polygon, double z_mi
   return mesh;
 }
 
+TriangleMesh cylinder_mesh(double radius, double height) {
+  if (!(radius > 0.0)) throw std::invalid_argument("a cylinder needs a positive radius");
+  constexpr int kSides = 64;
+  std::vector<Eigen::Vector2d> circle;
+  for (int i = 0; i < kSides; ++i) {
+    const double angle = 2.0 * M_PI * i / kSides;
+    circle.emplace_back(radius * std::cos(angle), radius * std::sin(angle));
+  }
+  return prism_mesh(circle, -height / 2.0, height / 2.0);
+}
+
+TriangleMesh sphere_mesh(double radius) {
+  if (!(radius > 0.0)) throw std::invalid_argument("a sphere needs a positive radius");
+  constexpr int kRings = 32, kSides = 64;
+  TriangleMesh mesh;
+  mesh.vertices = {{0, 0, -radius}};
+  for (int ring = 1; ring < kRings; ++ring) {
+    const double polar = M_PI * ring / kRings;
+    for (int side = 0; side < kSides; ++side) {
+      const double azimuth = 2.0 * M_PI * side / kSides;
+      mesh.vertices.emplace_back(radius * std::sin(polar) * std::cos(azimuth),
+                                 radius * std::sin(polar) * std::sin(azimuth), -radius * std::cos(polar));
+    }
+  }
+  mesh.vertices.emplace_back(0, 0, radius);
+  const int top = static_cast<int>(mesh.vertices.size()) - 1;
+  const auto corner = [](int ring, int side) { return 1 + (ring - 1) * kSides + side % kSides; };
+  for (int side = 0; side < kSides; ++side) {
+    mesh.triangles.emplace_back(0, corner(1, side + 1), corner(1, side));
+    for (int ring = 1; ring + 1 < kRings; ++ring) {
+      mesh.triangles.emplace_back(corner(ring, side), corner(ring, side + 1), corner(ring + 1, side + 1));
+      mesh.triangles.emplace_back(corner(ring, side), corner(ring + 1, side + 1), corner(ring + 1, side));
+    }
+    mesh.triangles.emplace_back(corner(kRings - 1, side), corner(kRings - 1, side + 1), top);
+  }
+  return mesh;
+}
+
 }  // namespace dofusion

@@ -22,4 +22,9 @@ TriangleMesh box_mesh(const Eigen::Vector3d& edges);
 // A prism over a convex polygon (counter-clockwise in x-y), from z = z_min to z_max.
 TriangleMesh prism_mesh(const std::vector<Eigen::Vector2d>& polygon, double z_min, double z_max);
 
+// Tessellations whose corners lie on the round surface, centred at the origin; the bounding box is the solid's own.
+// The surface lies at most 0.0012 (cylinder) or 0.005 (sphere) radii inside the round one.
+TriangleMesh cylinder_mesh(double radius, double height);  // about z, 64 sides
+TriangleMesh sphere_mesh(double radius);                   // 32 rings of 64
+
 }  // namespace dofusion
