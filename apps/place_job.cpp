@@ -87,14 +87,14 @@ std::string object_file(std::size_t index) { return "objects/" + std::to_string(
 
 std::string scene_xml(const PlaceInputs& inputs, const PlaceResult& result, const PhysicsOptions& physics) {
   Scene scene = result.recovered.scene;
-  std::vector<std::string> files;
-  for (std::size_t i = 0; i < scene.objects.size(); ++i) files.push_back(object_file(i));
+  MjcfOptions mjcf;
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) mjcf.mesh_files.push_back(object_file(i));
   if (!result.placements.empty()) {
     scene.objects.push_back(inputs.query);
     scene.T_world_object.push_back(result.placements.front().T_world_query);
-    files.emplace_back("query.obj");
+    mjcf.mesh_files.emplace_back("query.obj");
   }
-  return mjcf_text(scene.objects, scene.T_world_object, physics, files);
+  return mjcf_text(scene.objects, scene.T_world_object, physics, mjcf);
 }
 
 }  // namespace

@@ -16,6 +16,14 @@ namespace {
 constexpr int kBoxBase = 0;            // index of the cube among the base shapes: scaled, it is every box
 constexpr int kTriesPerDropped = 12;   // drops of one object before the scene is begun anew
 constexpr int kTriesPerStacked = 4;    // the same in stacks, where what lies below decides more
+constexpr double kGravity = 9.81;
+// A drop from anywhere above the neighbourhood comes to rest alone four times of five. So more of them are aimed over an
+// object or between two, and most that have come to rest alone are shoved towards their neighbour.
+constexpr double kShareOver = 0.85, kShareBridging = 0.3, kShareShoved = 0.25;
+constexpr double kOverReach = 0.3, kNearReach = 0.9;     // of the sum of the two radii
+constexpr double kLeastShove = 0.9, kLargestShove = 1.1;  // of the object's weight
+constexpr double kShoveSeconds = 0.4;                     // simulated
+constexpr double kLongestDrop = 2.0;                     // simulated seconds; what still moves then is dropped anew
 constexpr double kLargestAspect = 6.0;
 constexpr double kLargestSizeRatio = 3.0;
 
@@ -99,7 +107,7 @@ struct SceneGenerator::Impl {
   SimulatorCache simulators;
   GenerationStatistics statistics;
 
-  explicit Impl(const GenerationOptions& o) : options(o), simulators(o.physics, o.shapes == ShapeFamily::kBlocks ? 512 : 8) {
+  explicit Impl(const GenerationOptions& o) : options(o), simulators(o.physics, o.shapes == ShapeFamily::kBlocks ? 1024 : 16) {
     for (const std::string& name : block_names()) {
       blocks.push_back(make_block(name));
       shapes.push_back({name, blocks.back()->mesh, blocks.back()});
@@ -175,19 +183,58 @@ struct SceneGenerator::Impl {
       const Eigen::Vector3d& at = scene.T_world_object.back().translation();
       return pose_above(scene, object, R, at.x() + normal(rng, sigma), at.y() + normal(rng, sigma), gap);
     }
-    // Orientations: any, and some that start near a rest face, which widen what leaning and lying objects do.
-    const Eigen::Matrix3d any = random_rotation(rng);
-    const Eigen::Matrix3d R = uniform(rng) < 0.7 ? any : resting_orientation(object, false, rng).value_or(any);
-    if (scene.objects.empty()) return pose_above(scene, object, R, 0.0, 0.0, gap);
-    // Near some object: over it, over its border, or just beside.
-    const int target = uniform_int(rng, 0, static_cast<int>(scene.objects.size()) - 1);
-    const double reach = 0.9 * (radius(*scene.objects[target]) + radius(object));
-    const double distance = reach * uniform(rng), angle = uniform(rng, 0.0, 2.0 * M_PI);
-    const Eigen::Vector3d& at = scene.T_world_object[target].translation();
-    return pose_above(scene, object, R, at.x() + distance * std::cos(angle), at.y() + distance * std::sin(angle), gap);
+    return propose_near(scene, object, rng);
   }
 
-  bool acceptable(const SettleResult& settled, Rng& rng) const {
+  // Above what is there: over an object, over the middle between two, or anywhere near.
+  Pose propose_near(const Scene& scene, const Object& object, Rng& rng) {
+    const Eigen::Matrix3d any = random_rotation(rng);
+    const Eigen::Matrix3d R = uniform(rng) < 0.5 ? any : resting_orientation(object, false, rng).value_or(any);
+    Eigen::Vector2d at = Eigen::Vector2d::Zero();
+    if (!scene.objects.empty()) {
+      const int last = static_cast<int>(scene.objects.size()) - 1;
+      const int target = uniform_int(rng, 0, last), other = uniform_int(rng, 0, last);
+      at = scene.T_world_object[target].translation().head<2>();
+      if (uniform(rng) < kShareBridging) at = (at + scene.T_world_object[other].translation().head<2>()) / 2.0;
+      const double reach = uniform(rng) < kShareOver ? kOverReach : kNearReach;
+      const double distance = reach * (radius(*scene.objects[target]) + radius(object)) * uniform(rng);
+      const double angle = uniform(rng, 0.0, 2.0 * M_PI);
+      at += distance * Eigen::Vector2d(std::cos(angle), std::sin(angle));
+    }
+    return pose_above(scene, object, R, at.x(), at.y(), drop_gap(object));
+  }
+
+  // A push along the table towards the nearest other object, for a new one that has come to rest alone: it slides up to
+  // it, or tips over and leans on it.
+  SettleResult shove(const std::vector<ObjectPtr>& objects, const std::vector<Pose>& poses, Rng& rng) {
+    const Eigen::Vector2d from = poses.back().translation().head<2>();
+    Eigen::Vector2d nearest = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());
+    for (std::size_t i = 0; i + 1 < poses.size(); ++i) {
+      const Eigen::Vector2d way = poses[i].translation().head<2>() - from;
+      if (way.norm() < nearest.norm()) nearest = way;
+    }
+    const double weight = options.physics.density * objects.back()->volume * kGravity;
+    const Eigen::Vector2d force = uniform(rng, kLeastShove, kLargestShove) * weight * nearest.normalized();
+    Loads loads;
+    loads.forces.assign(objects.size(), Eigen::Vector3d::Zero());
+    loads.forces.back() = {force.x(), force.y(), 0.0};
+    loads.forces_until = kShoveSeconds;
+    return simulators.get(objects).run(poses, loads, {kLongestDrop, true});
+  }
+
+  // The scene with the last object at rest alone, if that is how it would end with the others fixed in place, which costs
+  // a fifth of the real thing. Such drops would be thrown away.
+  std::optional<std::vector<Pose>> foresee_alone(const std::vector<ObjectPtr>& objects, const std::vector<Pose>& poses) {
+    if (options.task == Task::kStack || objects.size() == 1) return std::nullopt;
+    std::vector<bool> fixed(objects.size(), true);
+    fixed.back() = false;
+    const SettleResult settled = simulators.get(objects, fixed).run(poses, {}, {kLongestDrop, true});
+    ++statistics.foreseen;
+    return lies_alone(settled) ? std::make_optional(settled.T_world_object) : std::nullopt;
+  }
+
+  // `apart`: the new object may lie on the table touching no other.
+  bool acceptable(const SettleResult& settled, bool apart) const {
     if (settled.status != SettleStatus::kSettled) return false;
     const std::vector<std::uint32_t> masks = touch_masks(settled.T_world_object.size(), settled.touching);
     const int last = static_cast<int>(masks.size()) - 1;
@@ -201,14 +248,21 @@ struct SceneGenerator::Impl {
       }
       return true;
     }
-    const bool alone = masks[last] == bit_of(-1);
-    return !alone || uniform(rng) < options.apart;
+    return apart || !lies_alone(settled);
+  }
+
+  // The last object has come to rest on the table and touches no other.
+  static bool lies_alone(const SettleResult& settled) {
+    const std::size_t count = settled.T_world_object.size();
+    return settled.status == SettleStatus::kSettled && count > 1 &&
+           touch_masks(count, settled.touching).back() == bit_of(-1);
   }
 
   // Drops one object until it comes to rest as wanted; false after too many tries.
   bool add_object(SceneRecord& record, Scene& scene, Rng& rng) {
     const int tries = options.task == Task::kStack ? kTriesPerStacked : kTriesPerDropped;
     const Draw draw = draw_object(rng);
+    const bool apart = uniform(rng) < options.apart;
     std::vector<ObjectPtr> objects = scene.objects;
     objects.push_back(draw.object);
     for (int attempt = 0; attempt < tries; ++attempt) {
@@ -216,9 +270,13 @@ struct SceneGenerator::Impl {
       if (!proposal) return false;
       std::vector<Pose> poses = scene.T_world_object;
       poses.push_back(*proposal);
-      const SettleResult settled = simulators.get(objects).settle(poses);
+      const auto alone = apart ? std::nullopt : foresee_alone(objects, poses);
+      if (alone && uniform(rng) > kShareShoved) continue;
+      const SettleResult settled =
+          alone ? shove(objects, *alone, rng) : simulators.get(objects).run(poses, {}, {kLongestDrop, true});
       ++statistics.drops;
-      if (!acceptable(settled, rng)) continue;
+      statistics.shoves += alone ? 1 : 0;
+      if (!acceptable(settled, apart)) continue;
       ++statistics.accepted;
       record.objects.push_back({draw.shape, draw.scale, Pose::Identity(), 0});
       const std::vector<std::uint32_t> masks = touch_masks(objects.size(), settled.touching);

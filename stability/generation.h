@@ -23,12 +23,14 @@ struct GenerationOptions {
   int objects = 2;                          // 1 … 6; a single scene has one
   ShapeFamily shapes = ShapeFamily::kBlocks;
   std::uint64_t seed = 0;
-  double apart = 0.1;                       // share of dropped objects that may come to rest touching no other
+  double apart = 0.2;                       // share of dropped objects that may come to rest touching no other
   PhysicsOptions physics;
 };
 
 struct GenerationStatistics {
-  std::int64_t drops = 0;     // simulations of a new object
+  std::int64_t foreseen = 0;  // drops tried with the other objects fixed, to skip those that come to rest alone
+  std::int64_t drops = 0;     // simulations of a new object among free ones
+  std::int64_t shoves = 0;    // of these pushed along the table towards a neighbour
   std::int64_t accepted = 0;  // of these kept
   std::int64_t restarts = 0;  // scenes begun anew
 };

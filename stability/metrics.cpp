@@ -6,6 +6,8 @@
 #include <numeric>
 #include <stdexcept>
 
+#include <Eigen/Geometry>
+
 namespace dofusion {
 namespace {
 
@@ -37,6 +39,17 @@ Displacement displacement(const std::vector<ObjectPtr>& objects, const std::vect
     const double turned = rotation_angle(before[i].linear().transpose() * after[i].linear());
     largest.translation_pct = std::max(largest.translation_pct, 100.0 * moved / objects[i]->diameter);
     largest.rotation_deg = std::max(largest.rotation_deg, turned * 180.0 / M_PI);
+  }
+  return largest;
+}
+
+double largest_tilt_deg(const std::vector<Pose>& before, const std::vector<Pose>& after) {
+  if (before.size() != after.size()) throw std::invalid_argument("tilt needs as many poses after as before");
+  double largest = 0.0;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    // The vertical in the object's frame, before and after.
+    const Eigen::Vector3d up = before[i].linear().row(2).transpose(), now = after[i].linear().row(2).transpose();
+    largest = std::max(largest, std::atan2(up.cross(now).norm(), up.dot(now)) * 180.0 / M_PI);
   }
   return largest;
 }

@@ -21,6 +21,12 @@ inline constexpr double kStableTranslationPct = 10.0;
 inline constexpr double kStableRotationDeg = 10.0;
 bool is_stable(const Displacement& displacement);
 
+// The largest angle between what was upright of an object before and what is after; turning about the vertical does
+// not count.
+double largest_tilt_deg(const std::vector<Pose>& before, const std::vector<Pose>& after);
+inline constexpr double kTiltedDeg = 20.0;         // beyond this an object has been tilted
+inline constexpr double kQuietRotationDeg = 10.0;  // accumulated rotation below which a scene has stayed quiet
+
 double median(std::vector<double> values);  // NaN if empty
 
 struct Interval {

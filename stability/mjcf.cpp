@@ -1,7 +1,13 @@
 #include "stability/mjcf.h"
 
+#include <algorithm>
+#include <filesystem>
 #include <iomanip>
 #include <sstream>
+
+#include "stability/convex_hull.h"
+#include "stability/files.h"
+#include "stability/mesh_io.h"
 
 namespace dofusion {
 namespace {
@@ -18,32 +24,62 @@ std::string xml_safe(std::string text) {
   return text;
 }
 
-void write_mesh_asset(std::ostream& out, const TriangleMesh& mesh, std::size_t index, const std::string& file) {
-  out << "    <mesh name=\"mesh_" << index << "\"";
-  if (!file.empty()) {
-    out << " file=\"" << xml_safe(file) << "\"/>\n";
-    return;
-  }
-  out << " vertex=\"";
+// MuJoCo gives a mesh at most three contacts with a plane, and a prism that lies on a rectangle rocks about the
+// diagonal. So the corners of a mesh's hull carry the contact with the table, as massless spheres far smaller than any
+// tolerance; the mesh itself meets other objects only. Meshes with very many corners keep MuJoCo's own contact.
+constexpr double kCornerRadius = 1e-5;
+constexpr std::size_t kMostCorners = 128;
+
+// What stands for one object in the model.
+struct Body {
+  const Object& object;
+  std::vector<TriangleMesh> solids;      // convex: what others touch; empty for primitives
+  std::vector<Eigen::Vector3d> corners;  // what the table touches; empty if the solids touch it themselves
+  std::string file;                      // of the mesh; empty: everything stands in the text
+};
+
+Body make_body(const Object& object, const std::string& file) {
+  Body body{object, {}, {}, file};
+  if (object.kind != SolidKind::kMesh) return body;
+  body.solids = object.parts;
+  if (body.solids.empty()) body.solids = {object.mesh};
+  body.corners = object.convex ? object.mesh.vertices : convex_hull(object.mesh.vertices).vertices;
+  if (body.corners.size() > kMostCorners) body.corners.clear();
+  return body;
+}
+
+bool is_round(const Object& object) {
+  return object.kind == SolidKind::kCylinder || object.kind == SolidKind::kSphere;
+}
+
+// A mesh that the file shows but nothing touches, where convex parts stand for it.
+bool is_shown_apart(const Body& body) { return !body.file.empty() && !body.object.parts.empty(); }
+
+std::string solid_name(std::size_t index, std::size_t part) {
+  return "mesh_" + std::to_string(index) + (part == 0 ? "" : "_" + std::to_string(part));
+}
+
+void write_mesh_file(std::ostream& out, const std::string& name, const std::string& file) {
+  out << "    <mesh name=\"" << name << "\" file=\"" << xml_safe(file) << "\"/>\n";
+}
+
+void write_mesh(std::ostream& out, const std::string& name, const TriangleMesh& mesh) {
+  out << "    <mesh name=\"" << name << "\" vertex=\"";
   for (const Eigen::Vector3d& v : mesh.vertices) out << v << ' ';
   out << "\" face=\"";
   for (const Eigen::Vector3i& t : mesh.triangles) out << t[0] << ' ' << t[1] << ' ' << t[2] << ' ';
   out << "\"/>\n";
 }
 
-// MuJoCo gives a mesh at most three contacts with a plane, and a prism that lies on a rectangle rocks about the
-// diagonal. So the hull's corners carry the contact with the table, as massless spheres far smaller than any
-// tolerance; the mesh itself meets other objects only. Meshes with very many corners keep MuJoCo's own contact.
-constexpr double kCornerRadius = 1e-5;
-constexpr std::size_t kMostCorners = 128;
-
-bool rests_on_corners(const Object& object) {
-  return !object.box_edges && object.mesh.vertices.size() <= kMostCorners;
-}
-
-void write_corners(std::ostream& out, const TriangleMesh& mesh) {
-  for (const Eigen::Vector3d& v : mesh.vertices) {
-    out << "      <geom class=\"corner\" pos=\"" << v << "\"/>\n";
+void write_assets(std::ostream& out, const Body& body, std::size_t index) {
+  if (is_shown_apart(body)) write_mesh_file(out, "shown_" + std::to_string(index), body.file);
+  for (std::size_t part = 0; part < body.solids.size(); ++part) {
+    const std::string name = solid_name(index, part);
+    if (!body.file.empty() && body.object.parts.empty()) {
+      write_mesh_file(out, name, body.file);
+    } else {
+      write_mesh(out, name, body.solids[part]);
+    }
   }
 }
 
@@ -53,61 +89,130 @@ const char* colour(std::size_t index) {
   return colours[index % 6];
 }
 
-}  // namespace
+// The exact mass and inertia of the uniform solid, whatever stands for its surface.
+void write_inertia(std::ostream& out, const Object& object, double density) {
+  const Eigen::Matrix3d I = density * object.inertia;
+  out << "      <inertial pos=\"0 0 0\" mass=\"" << density * object.volume << "\" fullinertia=\"" << I(0, 0) << ' '
+      << I(1, 1) << ' ' << I(2, 2) << ' ' << I(0, 1) << ' ' << I(0, 2) << ' ' << I(1, 2) << "\"/>\n";
+}
 
-std::string mjcf_text(const std::vector<ObjectPtr>& objects, const std::vector<Pose>& poses,
-                      const PhysicsOptions& options, const std::vector<std::string>& mesh_files) {
-  std::ostringstream out;
-  out << std::setprecision(9);
-  std::size_t contacts = 16;  // room for 16 an object, or for every corner that may lie on the table
-  for (const ObjectPtr& object : objects) {
-    contacts += 16 + (rests_on_corners(*object) ? object->mesh.vertices.size() : 0);
+void write_primitive(std::ostream& out, const Object& object) {
+  const BoundingBox box = bounding_box(object.mesh);
+  const Eigen::Vector3d half = (box.max - box.min) / 2.0;
+  switch (object.kind) {
+    case SolidKind::kBox: out << "type=\"box\" size=\"" << half << "\""; break;
+    case SolidKind::kCylinder: out << "type=\"cylinder\" size=\"" << half.x() << ' ' << half.z() << "\""; break;
+    case SolidKind::kSphere: out << "type=\"sphere\" size=\"" << half.x() << "\""; break;
+    case SolidKind::kMesh: break;
   }
-  out << "<mujoco model=\"dofusion\">\n"
-      << "  <compiler angle=\"radian\"/>\n"
+}
+
+void write_geoms(std::ostream& out, const Body& body, std::size_t index) {
+  const std::string look = std::string(" rgba=\"") + colour(index) + "\"/>\n";
+  if (body.object.kind != SolidKind::kMesh) {
+    out << "      <geom class=\"" << (is_round(body.object) ? "round" : "solid") << "\" name=\"geom_" << index << "\" ";
+    write_primitive(out, body.object);
+    out << look;
+    return;
+  }
+  if (is_shown_apart(body)) {
+    out << "      <geom class=\"shown\" type=\"mesh\" mesh=\"shown_" << index << "\"" << look;
+  }
+  for (std::size_t part = 0; part < body.solids.size(); ++part) {
+    out << "      <geom class=\"" << (body.corners.empty() ? "solid" : "above") << "\" name=\"geom_" << index
+        << (part == 0 ? "" : "_" + std::to_string(part)) << "\" type=\"mesh\" mesh=\"" << solid_name(index, part) << "\"";
+    if (is_shown_apart(body)) out << " group=\"3\"";
+    out << look;
+  }
+  for (const Eigen::Vector3d& corner : body.corners) {
+    out << "      <geom class=\"corner\" pos=\"" << corner << "\"/>\n";
+  }
+}
+
+void write_body(std::ostream& out, const Body& body, std::size_t index, const Pose& T_world_object, bool fixed,
+                double density) {
+  const PoseArray pose = to_array(T_world_object);
+  out << "    <body name=\"object_" << index << "\" pos=\"" << pose[0] << ' ' << pose[1] << ' ' << pose[2]
+      << "\" quat=\"" << pose[3] << ' ' << pose[4] << ' ' << pose[5] << ' ' << pose[6] << "\""
+      << (fixed ? " mocap=\"true\">\n" : ">\n      <freejoint/>\n");
+  write_inertia(out, body.object, density);
+  write_geoms(out, body, index);
+  out << "    </body>\n";
+}
+
+// Room for contacts: 16 a convex solid, or every corner that may lie on the table.
+std::size_t contact_room(const std::vector<Body>& bodies) {
+  constexpr std::size_t kMostPerObject = 96;
+  std::size_t contacts = 16;
+  for (const Body& body : bodies) {
+    contacts += std::min(kMostPerObject, 16 * std::max<std::size_t>(1, body.solids.size())) + body.corners.size();
+  }
+  return contacts;
+}
+
+void write_settings(std::ostream& out, const std::vector<Body>& bodies, const PhysicsOptions& options) {
+  const std::size_t contacts = contact_room(bodies);
+  const bool round = std::any_of(bodies.begin(), bodies.end(), [](const Body& b) { return is_round(b.object); });
+  out << "  <compiler angle=\"radian\" balanceinertia=\"true\"/>\n"
       // Elliptic cones, a high impratio and no-slip iterations keep friction from creeping.
       << "  <option timestep=\"" << options.timestep << "\" cone=\"elliptic\" impratio=\"10\" noslip_iterations=\"4\">\n"
       // A face must rest on more than one point.
       << "    <flag multiccd=\"enable\"/>\n"
       << "  </option>\n"
-      << "  <size nconmax=\"" << contacts << "\" njmax=\"" << 4 * contacts << "\" nstack=\"" << 100000 * (1 + objects.size())
-      << "\"/>\n"
+      << "  <size nconmax=\"" << contacts << "\" njmax=\"" << (round ? 6 : 4) * contacts << "\" nstack=\""
+      << 100000 * (1 + bodies.size()) << "\"/>\n"
       << "  <default>\n"
-      << "    <geom density=\"" << options.density << "\" friction=\"" << options.friction
-      << " 0.005 0.0001\" condim=\"4\" solref=\"" << 2.5 * options.timestep << " 1\" solimp=\"0.95 0.99 0.0005\"/>\n"
-      // The table meets boxes (bit 2 of their conaffinity) and corners, objects meet each other.
+      << "    <geom friction=\"" << options.friction << " 0.005 0.0001\" condim=\"4\" solref=\"" << options.contact_time
+      << " 1\" solimp=\"0.99 0.99 0.0005\"/>\n"
+      // Bit 1: objects among themselves; bit 2: the table, which meets solids or the corners of those above it.
+      << "    <default class=\"solid\"><geom contype=\"1\" conaffinity=\"3\"/></default>\n"
+      << "    <default class=\"round\"><geom contype=\"1\" conaffinity=\"3\" condim=\"6\" friction=\"" << options.friction
+      << " 0.005 " << options.rolling_friction << "\"/></default>\n"
+      << "    <default class=\"above\"><geom contype=\"1\" conaffinity=\"1\"/></default>\n"
       << "    <default class=\"corner\"><geom type=\"sphere\" size=\"" << kCornerRadius
-      << "\" mass=\"0\" contype=\"0\" conaffinity=\"2\" group=\"3\"/></default>\n"
-      << "  </default>\n"
-      << "  <visual><global offwidth=\"1280\" offheight=\"960\"/></visual>\n"
-      << "  <asset>\n";
+      << "\" contype=\"0\" conaffinity=\"2\" group=\"3\"/></default>\n"
+      << "    <default class=\"shown\"><geom contype=\"0\" conaffinity=\"0\" group=\"1\"/></default>\n"
+      << "  </default>\n";
+}
+
+}  // namespace
+
+std::string mjcf_text(const std::vector<ObjectPtr>& objects, const std::vector<Pose>& poses,
+                      const PhysicsOptions& options, const MjcfOptions& mjcf) {
+  std::vector<Body> bodies;
   for (std::size_t i = 0; i < objects.size(); ++i) {
-    if (objects[i]->box_edges) continue;
-    write_mesh_asset(out, objects[i]->mesh, i, mesh_files.empty() ? std::string() : mesh_files[i]);
+    bodies.push_back(make_body(*objects[i], mjcf.mesh_files.empty() ? std::string() : mjcf.mesh_files[i]));
   }
+  std::ostringstream out;
+  out << std::setprecision(9);
+  out << "<mujoco model=\"dofusion\">\n";
+  write_settings(out, bodies, options);
+  out << "  <visual><global offwidth=\"1280\" offheight=\"960\"/></visual>\n"
+      << "  <asset>\n";
+  for (std::size_t i = 0; i < bodies.size(); ++i) write_assets(out, bodies[i], i);
   out << "  </asset>\n"
       << "  <worldbody>\n"
       << "    <light pos=\"0.5 -0.5 1.5\" dir=\"-0.3 0.3 -1\" diffuse=\"0.7 0.7 0.7\"/>\n"
       << "    <geom name=\"table\" type=\"plane\" size=\"0 0 0.05\" contype=\"2\" conaffinity=\"0\" rgba=\"0.8 0.8 0.8 1\"/>\n";
-  for (std::size_t i = 0; i < objects.size(); ++i) {
-    const PoseArray pose = to_array(poses.empty() ? Pose::Identity() : poses[i]);
-    out << "    <body name=\"object_" << i << "\" pos=\"" << pose[0] << ' ' << pose[1] << ' ' << pose[2] << "\" quat=\""
-        << pose[3] << ' ' << pose[4] << ' ' << pose[5] << ' ' << pose[6] << "\">\n"
-        << "      <freejoint/>\n";
-    if (objects[i]->box_edges) {
-      out << "      <geom type=\"box\" size=\"" << (*objects[i]->box_edges / 2.0).eval() << "\"";
-    } else {
-      out << "      <geom type=\"mesh\" mesh=\"mesh_" << i << "\"";
-    }
-    const bool corners = rests_on_corners(*objects[i]);
-    out << " name=\"geom_" << i << "\" contype=\"1\" conaffinity=\"" << (corners ? 1 : 3) << "\" rgba=\"" << colour(i)
-        << "\"/>\n";
-    if (corners) write_corners(out, objects[i]->mesh);
-    out << "    </body>\n";
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    const bool fixed = !mjcf.fixed.empty() && mjcf.fixed[i];
+    write_body(out, bodies[i], i, poses.empty() ? Pose::Identity() : poses[i], fixed, options.density);
   }
   out << "  </worldbody>\n"
       << "</mujoco>\n";
   return out.str();
+}
+
+void write_mjcf(const Scene& scene, const std::string& directory, const PhysicsOptions& options) {
+  OutputDirectory output(directory);
+  std::filesystem::create_directory(output.path() / "objects");
+  MjcfOptions mjcf;
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+    mjcf.mesh_files.push_back("objects/" + std::to_string(i) + ".obj");
+    write_obj(scene.objects[i]->mesh, (output.path() / mjcf.mesh_files.back()).string());
+  }
+  write_file(output.path() / "scene.xml", mjcf_text(scene.objects, scene.T_world_object, options, mjcf));
+  output.commit();
 }
 
 }  // namespace dofusion
