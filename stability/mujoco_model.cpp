@@ -7,6 +7,7 @@
 #include <mutex>
 #include <stdexcept>
 
+#include "stability/box_collision.h"
 #include "stability/files.h"
 
 namespace dofusion {
@@ -26,15 +27,9 @@ std::unique_lock<std::mutex> lock_reader() {
   std::unique_lock<std::mutex> lock(mutex);
   mju_user_warning = ignore_warning;
   mju_user_error = exit_on_error;
+  repair_box_collision();
   return lock;
 }
-
-struct VfsDeleter {
-  void operator()(mjVFS* vfs) const {
-    mj_deleteVFS(vfs);
-    delete vfs;
-  }
-};
 
 std::string one_line(const char* text) {
   std::string line = text;
@@ -48,15 +43,17 @@ std::string one_line(const char* text) {
 
 ModelPtr compile_mjcf(const std::string& text) {
   const auto lock = lock_reader();
-  const std::unique_ptr<mjVFS, VfsDeleter> vfs(new mjVFS);
-  mj_defaultVFS(vfs.get());
+  // One for all: of 2 MB, it would leave a hole in the heap beside every model.
+  static mjVFS vfs;
+  mj_defaultVFS(&vfs);
   const char* name = "scene.xml";
-  if (mj_makeEmptyFileVFS(vfs.get(), name, static_cast<int>(text.size())) != 0) {
+  if (mj_makeEmptyFileVFS(&vfs, name, static_cast<int>(text.size())) != 0) {
     throw std::runtime_error("MuJoCo: no memory for the scene's XML");
   }
-  std::memcpy(vfs->filedata[mj_findFileVFS(vfs.get(), name)], text.data(), text.size());
+  std::memcpy(vfs.filedata[mj_findFileVFS(&vfs, name)], text.data(), text.size());
   char error[1000] = "";
-  ModelPtr model(mj_loadXML(name, vfs.get(), error, sizeof error));
+  ModelPtr model(mj_loadXML(name, &vfs, error, sizeof error));
+  mj_deleteVFS(&vfs);
   if (!model) throw std::runtime_error("MuJoCo cannot build the scene: " + one_line(error));
   return model;
 }

@@ -133,27 +133,6 @@ void Simulation::record(const Recording& recording) {
   recording.frames->push_back(poses());
 }
 
-namespace {
-
-// MuJoCo's collision of two boxes says half the depth where a face of one is touched (2.2.2: 2.5 mm for boxes that
-// overlap by 5 mm), and all of it between two edges. The normal of the former is that of the face.
-bool is_halved(const mjModel& model, const mjData& data, const mjContact& contact) {
-  constexpr double kParallel = 1.0 - 1e-9;
-  for (const int geom : {contact.geom1, contact.geom2}) {
-    if (model.geom_type[geom] != mjGEOM_BOX) return false;
-  }
-  for (const int geom : {contact.geom1, contact.geom2}) {
-    const mjtNum* R = data.geom_xmat + 9 * geom;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double cosine = contact.frame[0] * R[axis] + contact.frame[1] * R[3 + axis] + contact.frame[2] * R[6 + axis];
-      if (std::abs(cosine) > kParallel) return true;
-    }
-  }
-  return false;
-}
-
-}  // namespace
-
 // Collision once more, for surfaces up to kTouchingGap apart as well.
 void Simulation::find_near_contacts() {
   std::vector<mjtNum> margins(model_->geom_margin, model_->geom_margin + model_->ngeom);
@@ -166,9 +145,7 @@ void Simulation::find_near_contacts() {
 double Simulation::deepest_penetration() const {
   double depth = 0.0;
   for (int i = 0; i < data_->ncon; ++i) {
-    const mjContact& contact = data_->contact[i];
-    if (contact.dist >= 0.0) continue;
-    depth = std::max(depth, is_halved(*model_, *data_, contact) ? -2.0 * contact.dist : -contact.dist);
+    depth = std::max(depth, -data_->contact[i].dist);
   }
   return depth;
 }
