@@ -22,8 +22,6 @@ namespace dofusion {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr double kSmallest = 1e-3, kLargest = 10.0;  // metres, diameter; beyond, a unit is wrong
-
 constexpr std::size_t kMostTriangles = 100000;        // of a mesh: beyond, its physics takes minutes
 
 // The solid of a mesh file; `unit_option` is the argument that says its unit.
@@ -39,11 +37,7 @@ ObjectAndOffset load_solid(const std::string& file, double unit, const std::stri
   } catch (const std::invalid_argument& e) {
     throw InputError(file + ": " + e.what());
   }
-  if (solid.object->diameter < kSmallest || solid.object->diameter > kLargest) {
-    char metres[32];
-    std::snprintf(metres, sizeof metres, "%.3g", solid.object->diameter);
-    throw InputError(file + ": the object measures " + metres + " m; give the unit of its coordinates with " + unit_option);
-  }
+  check_object_size(file, solid.object->diameter, unit, unit_option);
   return solid;
 }
 

@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <memory>
 #include <stdexcept>
+#include <string>
 
 #include <Eigen/Geometry>
 
@@ -30,7 +31,7 @@ struct QhullRun {
 
 }  // namespace
 
-TriangleMesh convex_hull(const std::vector<Eigen::Vector3d>& points) {
+TriangleMesh convex_hull(const std::vector<Eigen::Vector3d>& points, const ConvexHullOptions& options) {
   if (points.size() < 4) throw std::invalid_argument("convex hull of fewer than four points");
   std::vector<coordT> coordinates;
   coordinates.reserve(points.size() * 3);
@@ -40,8 +41,14 @@ TriangleMesh convex_hull(const std::vector<Eigen::Vector3d>& points) {
   }
   QhullRun run;
   qhT* qh = &run.state;
-  char command[] = "qhull Qt Pp";
-  if (qh_new_qhull(qh, 3, static_cast<int>(points.size()), coordinates.data(), False, command, nullptr,
+  std::string command = "qhull Qt Pp";
+  if (options.max_corners > 4) command += " TA" + std::to_string(options.max_corners - 4);  // added to a tetrahedron
+  if (options.flatness > 0.0) {
+    char outside[32];
+    std::snprintf(outside, sizeof outside, " W%.6e", options.flatness);
+    command += outside;
+  }
+  if (qh_new_qhull(qh, 3, static_cast<int>(points.size()), coordinates.data(), False, command.data(), nullptr,
                    run.messages) != 0) {
     throw std::invalid_argument("convex hull of points that span no volume");
   }

@@ -2,32 +2,30 @@
 
 #include <algorithm>
 #include <array>
-#include <map>
+#include <cmath>
 #include <stdexcept>
+#include <unordered_set>
 
 #include <Eigen/Geometry>
 
+#include "stability/mesh_topology.h"
+#include "stability/point_tree.h"
+
 namespace dofusion {
 namespace {
-
-// For every vertex the first vertex at the same position.
-std::vector<int> position_ids(const TriangleMesh& mesh) {
-  std::map<std::array<double, 3>, int> first;
-  std::vector<int> ids;
-  ids.reserve(mesh.vertices.size());
-  for (const Eigen::Vector3d& v : mesh.vertices) {
-    // + 0.0 turns -0.0 into 0.0, which compare equal but might be written apart.
-    ids.push_back(first.emplace(std::array<double, 3>{v.x() + 0.0, v.y() + 0.0, v.z() + 0.0},
-                                static_cast<int>(ids.size()))
-                      .first->second);
-  }
-  return ids;
-}
 
 Eigen::Vector3d area_vector(const TriangleMesh& mesh, const Eigen::Vector3i& t) {
   const Eigen::Vector3d& a = mesh.vertices[t[0]];
   return 0.5 * (mesh.vertices[t[1]] - a).cross(mesh.vertices[t[2]] - a);
 }
+
+struct PlaneHash {
+  std::size_t operator()(const std::array<long, 4>& key) const {
+    std::size_t hash = 0;
+    for (const long k : key) hash = (hash ^ static_cast<std::size_t>(k)) * 0x9e3779b97f4a7c15ULL;
+    return hash ^ (hash >> 32);
+  }
+};
 
 }  // namespace
 
@@ -63,21 +61,13 @@ Eigen::Matrix3d inertia(const TriangleMesh& mesh) {
   for (const Eigen::Vector3i& t : mesh.triangles) {
     const Eigen::Vector3d &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
     const Eigen::Vector3d sum = a + b + c;
-    moments += a.dot(b.cross(c)) / 120.0 *
-               (a * a.transpose() + b * b.transpose() + c * c.transpose() + sum * sum.transpose());
+    moments +=
+        a.dot(b.cross(c)) / 120.0 * (a * a.transpose() + b * b.transpose() + c * c.transpose() + sum * sum.transpose());
   }
   return moments.trace() * Eigen::Matrix3d::Identity() - moments;
 }
 
-double diameter(const TriangleMesh& mesh) {
-  double squared = 0.0;
-  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
-    for (std::size_t j = i + 1; j < mesh.vertices.size(); ++j) {
-      squared = std::max(squared, (mesh.vertices[i] - mesh.vertices[j]).squaredNorm());
-    }
-  }
-  return std::sqrt(squared);
-}
+double diameter(const TriangleMesh& mesh) { return PointTree(mesh.vertices).diameter(); }
 
 BoundingBox bounding_box(const TriangleMesh& mesh) {
   if (mesh.vertices.empty()) throw std::invalid_argument("bounding box of an empty mesh");
@@ -95,33 +85,28 @@ double surface_area(const TriangleMesh& mesh) {
   return area;
 }
 
-bool is_closed(const TriangleMesh& mesh) {
-  if (mesh.triangles.empty()) return false;
-  const std::vector<int> ids = position_ids(mesh);
-  std::map<std::pair<int, int>, int> directed_edges;
-  for (const Eigen::Vector3i& t : mesh.triangles) {
-    for (int e = 0; e < 3; ++e) {
-      const int from = ids[t[e]], to = ids[t[(e + 1) % 3]];
-      if (from == to) return false;
-      if (++directed_edges[{from, to}] > 1) return false;
-    }
-  }
-  return std::all_of(directed_edges.begin(), directed_edges.end(), [&](const auto& edge) {
-    return directed_edges.count({edge.first.second, edge.first.first}) == 1;
-  });
-}
+bool is_closed(const TriangleMesh& mesh) { return !mesh.triangles.empty() && surface_faults(mesh).none(); }
 
 bool is_convex(const TriangleMesh& mesh, double tolerance) {
   const BoundingBox box = mesh.vertices.empty() ? BoundingBox{} : bounding_box(mesh);
   const double allowed = tolerance * (box.max - box.min).norm();
-  for (const Eigen::Vector3i& t : mesh.triangles) {
+  const PointTree tree(mesh.vertices);
+  // Planes that differ by no more than a hundredth of the tolerance are one: faces may be made of very many triangles.
+  const double normal_step = 1e-2 * tolerance, offset_step = 1e-2 * allowed;
+  const Eigen::Vector3d centre = (box.max + box.min) / 2.0;
+  std::unordered_set<std::array<long, 4>, PlaneHash> seen;
+  return std::none_of(mesh.triangles.begin(), mesh.triangles.end(), [&](const Eigen::Vector3i& t) {
     const Eigen::Vector3d normal = area_vector(mesh, t).normalized();
-    const double offset = normal.dot(mesh.vertices[t[0]]);
-    for (const Eigen::Vector3d& v : mesh.vertices) {
-      if (normal.dot(v) - offset > allowed) return false;
+    const double offset = normal.dot(mesh.vertices[t[0]] - centre);
+    if (tolerance > 0.0 && allowed > 0.0) {
+      const Eigen::Vector3d n = normal / normal_step;
+      if (!seen.insert({std::lround(n.x()), std::lround(n.y()), std::lround(n.z()), std::lround(offset / offset_step)})
+               .second) {
+        return false;
+      }
     }
-  }
-  return true;
+    return tree.any_beyond(normal, normal.dot(mesh.vertices[t[0]]) + allowed);
+  });
 }
 
 TriangleMesh weld(const TriangleMesh& mesh) {
@@ -175,8 +160,8 @@ std::vector<SurfaceSample> sample_surface(const TriangleMesh& mesh, int count, R
       v = 1.0 - v;
     }
     const Eigen::Vector3d& a = mesh.vertices[t[0]];
-    samples.push_back({a + u * (mesh.vertices[t[1]] - a) + v * (mesh.vertices[t[2]] - a),
-                       area_vector(mesh, t).normalized()});
+    samples.push_back(
+        {a + u * (mesh.vertices[t[1]] - a) + v * (mesh.vertices[t[2]] - a), area_vector(mesh, t).normalized()});
   }
   return samples;
 }

@@ -1,63 +1,155 @@
 #include "stability/mesh_io.h"
 
+#include <cstdio>
+#include <filesystem>
+#include <optional>
+
+#include <assimp/Importer.hpp>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
-#include <assimp/Importer.hpp>
-#include <cstdio>
-#include <filesystem>
-
 #include "stability/files.h"
+#include "stability/mesh_topology.h"
 
 namespace dofusion {
 
-TriangleMesh read_mesh(const std::string& path, double unit) {
+namespace {
+
+constexpr double kMostFileBytes = 2147483648.0;
+constexpr double kFarthest = 1e4;  // sizes from the origin; there a float still tells 1/2000 of the size
+constexpr double kSmallestObject = 1e-3, kLargestObject = 10.0;  // metres
+
+std::string text_of(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", value);
+  return text;
+}
+
+std::string text_of(const Eigen::Vector3d& p) {
+  return "(" + text_of(p.x()) + ", " + text_of(p.y()) + ", " + text_of(p.z()) + ")";
+}
+
+// "the edge between … and …, the first of 12," in the file's coordinates.
+std::string place_of(const EdgeFault& fault, double unit) {
+  return "the edge between " + text_of(fault.from / unit) + " and " + text_of(fault.to / unit) +
+         (fault.count > 1 ? ", the first of " + std::to_string(fault.count) + "," : "");
+}
+
+void check_file(const std::string& path) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) throw InputError(path + ": no such mesh file");
+  const auto bytes = static_cast<double>(std::filesystem::file_size(path, error));
+  if (bytes > kMostFileBytes) {
+    throw InputError(path + ": a mesh file of " + text_of(bytes / 1e9) + " GB; simplify the mesh to " +
+                     std::to_string(kMostFileTriangles) + " triangles or fewer");
+  }
+}
+
+void append(TriangleMesh& mesh, const aiMesh& part, double unit, const std::string& path) {
+  const int first = static_cast<int>(mesh.vertices.size());
+  for (unsigned i = 0; i < part.mNumVertices; ++i) {
+    mesh.vertices.push_back(unit * Eigen::Vector3d(part.mVertices[i].x, part.mVertices[i].y, part.mVertices[i].z));
+  }
+  for (unsigned i = 0; i < part.mNumFaces; ++i) {
+    const aiFace& face = part.mFaces[i];
+    if (face.mNumIndices != 3) continue;  // points and lines are no surface
+    const Eigen::Vector3i t = Eigen::Vector3i(static_cast<int>(face.mIndices[0]), static_cast<int>(face.mIndices[1]),
+                                              static_cast<int>(face.mIndices[2])) +
+                              Eigen::Vector3i::Constant(first);
+    for (int k = 0; k < 3; ++k) {
+      if (mesh.vertices[t[k]].allFinite()) continue;
+      throw InputError(path + ": triangle " + std::to_string(mesh.triangles.size() + 1) + " has a corner at " +
+                       text_of(mesh.vertices[t[k]] / unit) +
+                       ", which is not finite in single precision; export the mesh again");
+    }
+    mesh.triangles.push_back(t);
+  }
+}
+
+void refuse_holes_and_walls(const TriangleMesh& mesh, double unit, const std::string& path) {
+  const SurfaceFaults faults = surface_faults(mesh);
+  if (faults.open.count > 0) {
+    throw InputError(path + ": the mesh is open: " + place_of(faults.open, unit) +
+                     " belongs to one triangle only; close its holes (or merge vertices that nearly coincide)");
+  }
+  if (faults.odd.count > 0) {
+    throw InputError(path + ": the mesh has an inner wall: " + place_of(faults.odd, unit) + " is shared by " +
+                     std::to_string(faults.odd.triangles) + " triangles; remove what lies inside the solid");
+  }
+}
+
+TriangleMesh wound_outwards(const TriangleMesh& mesh, double unit, const std::string& path) {
+  const std::optional<ConsistentWinding> wound = wound_consistently(mesh);
+  if (!wound) throw InputError(path + ": the surface has one side only, as a Moebius strip; it bounds no solid");
+  const SurfaceFaults faults = surface_faults(wound->mesh);
+  if (faults.unbalanced.count > 0) {
+    throw InputError(path + ": the mesh crosses itself: " + place_of(faults.unbalanced, unit) + " is shared by " +
+                     std::to_string(faults.unbalanced.triangles) +
+                     " triangles that cannot all face outwards; separate the solids that meet there");
+  }
+  try {
+    return with_outward_shells(*wound);
+  } catch (const std::invalid_argument& e) {
+    throw InputError(path + ": " + e.what());
+  }
+}
+
+void refuse_without_volume(const TriangleMesh& mesh, const std::string& path) {
+  const BoundingBox box = bounding_box(mesh);
+  const double size = (box.max - box.min).norm();
+  const double distance = ((box.max + box.min) / 2.0).norm();
+  if (distance > kFarthest * size) {
+    throw InputError(path + ": the mesh lies " + text_of(distance / size) +
+                     " times its size from the origin, too far for its digits; move it to the origin");
+  }
+  if (!(std::abs(volume(translated(mesh, -box.min))) > 1e-9 * std::pow(size, 3))) {
+    throw InputError(path + ": the mesh encloses no volume; is it flat, or is every face there in both directions?");
+  }
+}
+
+}  // namespace
+
+TriangleMesh read_mesh(const std::string& path, double unit) {
+  check_file(path);
   Assimp::Importer importer;
-  const aiScene* scene = importer.ReadFile(
-      path, aiProcess_Triangulate | aiProcess_JoinIdenticalVertices | aiProcess_PreTransformVertices);
+  // Vertices are welded below, by exact position; assimp's own way would take longer.
+  const aiScene* scene = importer.ReadFile(path, aiProcess_Triangulate | aiProcess_PreTransformVertices);
   if (scene == nullptr || scene->mNumMeshes == 0) {
     const std::string reason = importer.GetErrorString();
     throw InputError(path + ": not a mesh that can be read" + (reason.empty() ? "" : " (" + reason + ")"));
   }
-  TriangleMesh mesh;
-  for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
-    const aiMesh& part = *scene->mMeshes[m];
-    const int first = static_cast<int>(mesh.vertices.size());
-    for (unsigned i = 0; i < part.mNumVertices; ++i) {
-      const Eigen::Vector3d v(part.mVertices[i].x, part.mVertices[i].y, part.mVertices[i].z);
-      if (!v.allFinite()) {
-        throw InputError(path + ": vertex " + std::to_string(mesh.vertices.size() + 1) + " is not finite");
-      }
-      mesh.vertices.push_back(v * unit);
-    }
-    for (unsigned i = 0; i < part.mNumFaces; ++i) {
-      const aiFace& face = part.mFaces[i];
-      if (face.mNumIndices != 3) continue;  // points and lines are no surface
-      mesh.triangles.emplace_back(first + static_cast<int>(face.mIndices[0]), first + static_cast<int>(face.mIndices[1]),
-                                  first + static_cast<int>(face.mIndices[2]));
-    }
+  std::size_t triangles = 0;
+  for (unsigned m = 0; m < scene->mNumMeshes; ++m) triangles += scene->mMeshes[m]->mNumFaces;
+  if (triangles > kMostFileTriangles) {
+    throw InputError(path + ": a mesh of " + std::to_string(triangles) + " triangles; simplify it to " +
+                     std::to_string(kMostFileTriangles) + " or fewer");
   }
+  TriangleMesh mesh;
+  for (unsigned m = 0; m < scene->mNumMeshes; ++m) append(mesh, *scene->mMeshes[m], unit, path);
+  importer.FreeScene();
   mesh = weld(mesh);
   if (mesh.triangles.empty()) throw InputError(path + ": the mesh has no triangles");
   return mesh;
 }
 
 TriangleMesh read_solid_mesh(const std::string& path, double unit) {
-  TriangleMesh mesh = read_mesh(path, unit);
-  if (!is_closed(mesh)) {
-    throw InputError(path + ": the mesh is open (some edge is not shared by two triangles); close its holes first");
+  const TriangleMesh mesh = without_repeated_triangles(read_mesh(path, unit));
+  refuse_holes_and_walls(mesh, unit, path);
+  TriangleMesh solid = wound_outwards(mesh, unit, path);
+  refuse_without_volume(solid, path);
+  return solid;
+}
+
+void check_object_size(const std::string& path, double object_diameter, double unit, const std::string& unit_option) {
+  if (object_diameter >= kSmallestObject && object_diameter <= kLargestObject) return;
+  std::string message = path + ": the object measures " + text_of(object_diameter) +
+                        " m; give the unit of its coordinates with " + unit_option;
+  for (const double other : {1.0, 0.001, 0.01}) {  // metres, millimetres, centimetres
+    const double size = object_diameter / unit * other;
+    if (size < 0.005 || size > 3.0) continue;
+    throw InputError(message + ": " + text_of(other) + " would make it " + text_of(size) + " m");
   }
-  const double mesh_volume = volume(mesh);
-  const BoundingBox box = bounding_box(mesh);
-  if (!(std::abs(mesh_volume) > 1e-9 * std::pow((box.max - box.min).norm(), 3))) {
-    throw InputError(path + ": the mesh encloses no volume");
-  }
-  if (mesh_volume < 0.0) {
-    for (Eigen::Vector3i& t : mesh.triangles) std::swap(t[1], t[2]);
-  }
-  return mesh;
+  throw InputError(message);
 }
 
 std::string to_obj(const TriangleMesh& mesh) {

@@ -1,20 +1,30 @@
 // Mesh files: anything that assimp reads in, Wavefront OBJ out.
 #pragma once
 
+#include <cstddef>
 #include <string>
 
 #include "stability/mesh.h"
 
 namespace dofusion {
 
+inline constexpr std::size_t kMostFileTriangles = 5000000;
+
 // Reads OBJ, STL, PLY, … ; coordinates are multiplied by `unit` to give metres. All parts of the file are merged,
-// polygons triangulated, equal vertices welded. Throws InputError naming the file if it cannot be read, has
-// no triangles or has a coordinate that is not finite.
+// polygons triangulated, equal vertices welded. Throws InputError naming the file if it cannot be read, has no
+// triangles or more than kMostFileTriangles, or has a coordinate that is not finite; the message names the first such
+// triangle.
 TriangleMesh read_mesh(const std::string& path, double unit = 1.0);
 
-// As read_mesh, and throws InputError naming the file if the mesh is not closed (a solid has no volume
-// otherwise); a mesh that is inside out is turned.
+// As read_mesh, for a mesh that bounds a solid. Triangles that are there twice are dropped; flipped ones are turned as
+// their neighbours are, and shells that are inside out, save walls of cavities. Several shells may be apart, or touch
+// along an edge. Throws InputError if the surface has holes, inner walls or one side only, with the place in the file's
+// own coordinates, or encloses no volume, or lies so far from the origin that single precision spoils it.
 TriangleMesh read_solid_mesh(const std::string& path, double unit = 1.0);
+
+// For programs that take a file's `unit` from the argument `unit_option`. Throws InputError if the diameter, in metres
+// with that unit, is under 1 mm or over 10 m; the message names the size, and a unit that would make it plausible.
+void check_object_size(const std::string& path, double object_diameter, double unit, const std::string& unit_option);
 
 // OBJ text, metres, with nine significant digits.
 std::string to_obj(const TriangleMesh& mesh);
