@@ -15,6 +15,7 @@
 #include "stability/dataset.h"
 #include "stability/files.h"
 #include "stability/generation.h"
+#include "stability/parallel_for.h"
 
 using namespace dofusion;
 

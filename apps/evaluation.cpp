@@ -11,6 +11,7 @@
 
 #include "apps/program.h"
 #include "stability/generation.h"
+#include "stability/parallel_for.h"
 #include "stability/shapes.h"
 
 namespace dofusion {

@@ -15,6 +15,7 @@
 #include "stability/files.h"
 #include "stability/generation.h"
 #include "stability/mesh_io.h"
+#include "stability/parallel_for.h"
 #include "stability/shapes.h"
 
 namespace dofusion {
