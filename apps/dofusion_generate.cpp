@@ -1,99 +1,89 @@
 // Stable scenes by dropping or stacking objects, to an HDF5 dataset.
-#include <algorithm>
-#include <chrono>
 #include <cstdio>
-#include <filesystem>
-#include <memory>
 
+#include "apps/generate_job.h"
 #include "apps/program.h"
+#include "apps/ranks.h"
 #include "stability/files.h"
-#include "stability/generation.h"
+#include "stability/generation_plan.h"
 
 using namespace dofusion;
 
 namespace {
 
-constexpr std::int64_t kChunk = 256;            // scenes between looks at the clock
-constexpr double kSecondsBetweenSaves = 60.0;   // at most this much work is lost to a kill
+struct Arguments {
+  std::string task = "unstructured", shapes = "blocks", recipe, out, json;
+  int objects = 2, threads = default_rank_threads();
+  std::int64_t count = 1000;
+  std::uint64_t seed = 0;
+  double scale = 1.0;
+};
 
-// The scenes that an interrupted run with the same settings has left.
-SceneDataset resume(const std::string& partial, const std::string& settings) {
-  std::error_code error;
-  if (!std::filesystem::exists(partial, error)) return {};
-  SceneDataset dataset = read_dataset(partial);
-  if (dataset.settings != settings) {
-    throw InputError(partial + ": left by a run with other settings; delete it or choose another --out");
+GenerationPlan plan_of(const Arguments& arguments) {
+  if (arguments.recipe == "paper") return finished_plan(paper_plan(), arguments.seed, arguments.scale);
+  if (!arguments.recipe.empty()) {
+    return finished_plan(plan_from_json(read_file(arguments.recipe), arguments.recipe), arguments.seed,
+                         arguments.scale);
   }
-  std::fprintf(stderr, "continuing with the %zu scenes of %s\n", dataset.scenes.size(), partial.c_str());
-  return dataset;
+  PlanPart part;
+  part.options.task = task_from_string(arguments.task);
+  part.options.objects = part.options.task == Task::kSingle ? 1 : arguments.objects;
+  part.options.shapes = shape_family_from_string(arguments.shapes);
+  part.count = arguments.count;
+  GenerationPlan plan;
+  plan.parts.push_back(part);
+  return finished_plan(plan, arguments.seed);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"Generates stable scenes by dropping objects one by one, or by stacking them, and simulating until "
-               "everything rests.\n\nExample:\n  dofusion-generate --task unstructured --objects 2 --count 10000 --out "
-               "two.h5",
-               "dofusion-generate"};
-  std::string task = "unstructured", shapes = "blocks", out;
-  GenerationOptions options;
-  std::int64_t count = 1000;
-  int threads = default_threads();
-  app.add_option("--task", task, "single, unstructured or stack")->capture_default_str();
-  app.add_option("--objects", options.objects, "objects in a scene, 1 to 6 (1 for single)")->capture_default_str();
-  app.add_option("--shapes", shapes, "blocks (the seven) or general (boxes of random proportions and blocks)")
-      ->capture_default_str();
-  app.add_option("--count", count, "scenes")->check(CLI::Range(1, 100'000'000))->capture_default_str();
-  app.add_option("--seed", options.seed, "the same seed gives the same scenes on any number of threads")
+  CLI::App app{
+      "Generates stable scenes by dropping objects one by one, or by stacking them, and simulating until "
+      "everything rests. After a kill the same command goes on where it was.\n\nExamples:\n"
+      "  dofusion-generate --task unstructured --objects 2 --count 10000 --out two.h5\n"
+      "  dofusion-generate --recipe paper --out paper.h5\n"
+      "  mpirun --hostfile hosts --map-by ppr:1:node --bind-to none dofusion-generate --recipe paper --out paper.h5",
+      "dofusion-generate"};
+  Arguments arguments;
+  auto* recipe = app.add_option("--recipe", arguments.recipe,
+                                "several kinds of scenes in one dataset: paper (800,000 scenes), or a JSON file of "
+                                "{\"parts\": [{\"task\", \"objects\", \"shapes\", \"count\"}, ...]}");
+  app.add_option("--scale", arguments.scale, "multiplies the recipe's counts")
+      ->check(CLI::Range(1e-6, 1e3))
+      ->needs(recipe);
+  app.add_option("--task", arguments.task, "or one kind: single, unstructured or stack")
+      ->capture_default_str()
+      ->excludes(recipe);
+  app.add_option("--objects", arguments.objects, "objects in a scene, 1 to 6 (1 for single)")
+      ->capture_default_str()
+      ->excludes(recipe);
+  app.add_option("--shapes", arguments.shapes, "blocks (the seven) or general (boxes of random proportions and blocks)")
+      ->capture_default_str()
+      ->excludes(recipe);
+  app.add_option("--count", arguments.count, "scenes")
+      ->check(CLI::Range(1, 100'000'000))
+      ->capture_default_str()
+      ->excludes(recipe);
+  app.add_option("--seed", arguments.seed, "the same seed gives the same file on any number of threads and machines")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  app.add_option("--threads", threads)->check(CLI::Range(1, 1024))->capture_default_str();
-  app.add_option("--out", out, "the dataset, HDF5; after a kill the same command goes on from FILE.partial")->required();
+  app.add_option("--threads", arguments.threads, "of this process")->check(CLI::Range(1, 1024))->capture_default_str();
+  app.add_option("--json", arguments.json, "write what was done to this file");
+  app.add_option("--out", arguments.out, "the dataset, HDF5; FILE.partial keeps the scenes until it is whole")
+      ->required();
 
-  return run_program(app, argc, argv, [&] {
-    options.task = task_from_string(task);
-    if (options.task == Task::kSingle) options.objects = 1;
-    options.shapes = shape_family_from_string(shapes);
-
-    std::vector<std::unique_ptr<SceneGenerator>> generators;
-    for (int t = 0; t < threads; ++t) generators.push_back(std::make_unique<SceneGenerator>(options));
-    const std::string partial = out + ".partial", settings = to_json(options);
-    SceneDataset dataset = resume(partial, settings);
-    dataset.shapes = generators.front()->shapes();
-    dataset.settings = settings;
-    if (static_cast<std::int64_t>(dataset.scenes.size()) > count) dataset.scenes.resize(static_cast<std::size_t>(count));
-    if (dataset.scenes.empty()) write_dataset(dataset, partial);  // an --out that cannot be written fails now
-
-    Progress progress("scenes", count, static_cast<std::int64_t>(dataset.scenes.size()));
-    auto saved = std::chrono::steady_clock::now();
-    while (static_cast<std::int64_t>(dataset.scenes.size()) < count) {
-      const auto first = static_cast<std::int64_t>(dataset.scenes.size());
-      const std::int64_t chunk = std::min(kChunk, count - first);
-      dataset.scenes.resize(static_cast<std::size_t>(first + chunk));
-      parallel_for(chunk, threads, [&](std::int64_t i, int thread) {
-        if (interrupted()) throw Interrupted("interrupted");
-        dataset.scenes[static_cast<std::size_t>(first + i)] = generators[static_cast<std::size_t>(thread)]->generate(first + i);
-      });
-      progress.update(first + chunk);
-      const auto now = std::chrono::steady_clock::now();
-      if (std::chrono::duration<double>(now - saved).count() > kSecondsBetweenSaves) {
-        write_dataset(dataset, partial);
-        saved = now;
-      }
+  const auto body = [&] {
+    Ranks ranks;
+    if (!ranks.first()) {
+      help_to_generate(
+          ranks, [&] { return plan_of(arguments); }, arguments.threads);
+      return;
     }
-    write_dataset(dataset, out);
-    std::error_code ignored;
-    std::filesystem::remove(partial, ignored);
-
-    GenerationStatistics total;
-    for (const auto& generator : generators) {
-      total.drops += generator->statistics().drops;
-      total.accepted += generator->statistics().accepted;
-      total.restarts += generator->statistics().restarts;
-    }
-    std::printf("%s: %zu scenes; of %ld simulated drops %.0f %% kept, %ld scenes begun anew\n", out.c_str(),
-                dataset.scenes.size(), static_cast<long>(total.drops),
-                100.0 * static_cast<double>(total.accepted) / static_cast<double>(std::max<std::int64_t>(1, total.drops)),
-                static_cast<long>(total.restarts));
-  });
+    if (!arguments.json.empty()) check_writable(arguments.json);
+    const GenerateResult result = generate_dataset(ranks, plan_of(arguments), arguments.out, arguments.threads);
+    if (!arguments.json.empty()) write_file(arguments.json, result.summary.dump(2) + "\n");
+    std::printf("%s\n", result.line.c_str());
+  };
+  return run_program(app, argc, argv, body, rank_from_environment() == 0);
 }

@@ -15,6 +15,7 @@
 #include "stability/dataset.h"
 #include "stability/files.h"
 #include "stability/generation.h"
+#include "stability/parallel_for.h"
 
 using namespace dofusion;
 
@@ -71,6 +72,7 @@ int main(int argc, char** argv) {
       "  dofusion-scan --data scenes.h5 --cameras 5 --sensor kinect --out scans",
       "dofusion-scan"};
   std::string data, task = "unstructured", shapes = "blocks", sensor = "realsense", split = "test", out, json;
+  std::string data_split;
   GenerationOptions generation;
   SyntheticViewOptions view_options;
   Camera camera = default_camera();
@@ -79,6 +81,8 @@ int main(int argc, char** argv) {
   std::uint64_t seed = 0;
   int cameras = 1, threads = default_threads();
   auto* data_option = app.add_option("--data", data, "scenes of this dataset (HDF5, of dofusion-generate)");
+  app.add_option("--data-split", data_split, "only the dataset's scenes of train, validation or test")
+      ->needs(data_option);
   app.add_option("--task", task, "or new scenes: single, unstructured or stack")
       ->capture_default_str()
       ->excludes(data_option);
@@ -119,10 +123,12 @@ int main(int argc, char** argv) {
     if (out.empty()) throw InputError("--out: the name of a folder is needed");
     if (!json.empty()) check_writable(json);
     OutputDirectory directory(out);
-    SceneDataset dataset =
-        data.empty() ? generate_scenes(generation, count > 0 ? count : 10, threads) : read_dataset(data);
-    if (count > 0 && count < static_cast<std::int64_t>(dataset.scenes.size()))
-      dataset.scenes.resize(static_cast<std::size_t>(count));
+    DatasetFilter filter;
+    if (!data_split.empty()) filter.split = split_from_string(data_split);
+    if (count > 0) filter.most = static_cast<std::size_t>(count);
+    const SceneDataset dataset =
+        data.empty() ? generate_scenes(generation, count > 0 ? count : 10, threads) : read_dataset(data, filter);
+    if (dataset.scenes.empty()) throw InputError(data + ": has no scene to scan");
     const Models models = collect_models(dataset);
     write_bop_models(models.objects, camera, directory.path());
 

@@ -1,4 +1,5 @@
 // Trains the placement model on datasets of stable scenes.
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -25,6 +26,13 @@ void print(const TrainReport& r) {
       static_cast<int>(r.seconds_left - 60.0 * minutes));
 }
 
+bool has_shape(const std::vector<SceneDataset>& datasets, const std::string& name) {
+  return std::any_of(datasets.begin(), datasets.end(), [&](const SceneDataset& dataset) {
+    return std::any_of(dataset.shapes.begin(), dataset.shapes.end(),
+                       [&](const ObjectPtr& shape) { return shape->name == name; });
+  });
+}
+
 std::string name_of(const std::string& path) { return std::filesystem::path(path).filename().string(); }
 
 }  // namespace
@@ -41,7 +49,7 @@ int main(int argc, char** argv) {
   options.threads = default_threads();
   app.add_option("--preset", preset, "default, or paper: the published method to the letter")->capture_default_str();
   app.add_option("--config", config_path, "JSON file of settings that replace the preset's");
-  app.add_option("--data", data, "datasets of dofusion-generate")->required();
+  app.add_option("--data", data, "datasets of dofusion-generate; their scenes for training are used")->required();
   app.add_option("--holdout-shape", holdout, "leave out every scene with this shape");
   app.add_option("--out", options.out, "the model, safetensors")->required();
   app.add_flag("--resume", options.resume, "go on from FILE.checkpoint");
@@ -75,14 +83,20 @@ int main(int argc, char** argv) {
 #ifdef DOFUSION_TORCH
     if (config.preset == Preset::kPaper) enable_torch_networks(options.threads);
 #endif
+    DatasetFilter filter;
+    filter.split = Split::kTrain;
+    filter.without_shape = holdout;
     std::vector<SceneDataset> datasets;
     nlohmann::json record{{"data", nlohmann::json::array()}, {"holdout_shape", holdout}};
     for (const std::string& path : data) {
-      datasets.push_back(read_dataset(path));
+      datasets.push_back(read_dataset(path, filter));
       record["data"].push_back(
           {{"file", name_of(path)}, {"scenes", datasets.back().scenes.size()}, {"settings", datasets.back().settings}});
     }
-    const TrainingSet set(std::move(datasets), config, holdout);
+    if (!holdout.empty() && !has_shape(datasets, holdout)) {
+      throw InputError("--holdout-shape: no shape of the data is called '" + holdout + "'");
+    }
+    const TrainingSet set(std::move(datasets), config);
     std::fprintf(stderr, "%zu scenes, preset %s, %d threads\n", set.scenes(), to_string(config.preset).c_str(),
                  options.threads);
     const auto report = [](const TrainReport& r) {

@@ -11,6 +11,7 @@
 
 #include "apps/program.h"
 #include "stability/generation.h"
+#include "stability/parallel_for.h"
 #include "stability/shapes.h"
 
 namespace dofusion {
@@ -124,7 +125,7 @@ std::vector<Instance> make_instances(const InstanceOptions& options) {
       Rng rng = make_rng(options.seed ^ 0x9e3779b97f4a7c15ull, static_cast<std::uint64_t>(index));
       const int last = static_cast<int>(record.objects.size()) - 1;
       const int query = options.task == Task::kStack ? last : uniform_int(rng, 0, last);
-      if (shapes.shapes[static_cast<std::size_t>(record.objects[static_cast<std::size_t>(query)].shape)].name != wanted) continue;
+      if (shapes.shapes[static_cast<std::size_t>(record.objects[static_cast<std::size_t>(query)].shape)]->name != wanted) continue;
       Scene scene = to_scene(shapes, record);
       Instance& instance = instances[static_cast<std::size_t>(i)];
       instance.query = scene.objects[static_cast<std::size_t>(query)];

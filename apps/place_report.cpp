@@ -9,6 +9,7 @@
 #include "apps/html.h"
 #include "apps/program.h"
 #include "perception/picture.h"
+#include "stability/parallel_for.h"
 
 namespace dofusion {
 namespace {

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "apps/program.h"
+#include "stability/parallel_for.h"
 
 namespace dofusion {
 namespace {

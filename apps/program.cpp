@@ -1,15 +1,14 @@
 #include "apps/program.h"
 
+#include <sched.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <csignal>
 #include <cstdio>
-#include <exception>
 #include <mutex>
 #include <stdexcept>
 #include <thread>
-#include <vector>
 
 #include "stability/files.h"
 
@@ -46,30 +45,34 @@ std::string duration(double seconds) {
 
 bool interrupted() { return stop_requested != 0; }
 
-int run_program(CLI::App& app, int argc, char** argv, const std::function<void()>& body) {
+int run_program(CLI::App& app, int argc, char** argv, const std::function<void()>& body, bool speaks) {
   std::signal(SIGINT, request_stop);
   std::signal(SIGTERM, request_stop);
+  std::signal(SIGXFSZ, SIG_IGN);  // a file over the user's limit is a write that fails, with its line
   app.set_version_flag("--version", "dofusion 0.1.0");
   app.get_formatter()->column_width(34);
   const std::string name = app.get_name();
+  const auto say = [&](const std::string& line) {
+    if (speaks) std::fprintf(stderr, "%s: %s\n", name.c_str(), line.c_str());
+  };
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    if (e.get_exit_code() == 0) return app.exit(e);  // --help, --version
-    std::fprintf(stderr, "%s: %s; see %s --help\n", name.c_str(), first_line(e.what()).c_str(), name.c_str());
+    if (e.get_exit_code() == 0) return speaks ? app.exit(e) : 0;  // --help, --version
+    say(first_line(e.what()) + "; see " + name + " --help");
     return 2;
   }
   try {
     body();
     return 0;
   } catch (const InputError& e) {
-    std::fprintf(stderr, "%s: %s\n", name.c_str(), first_line(e.what()).c_str());
+    say(first_line(e.what()));
     return 2;
   } catch (const std::invalid_argument& e) {
-    std::fprintf(stderr, "%s: %s\n", name.c_str(), first_line(e.what()).c_str());
+    say(first_line(e.what()));
     return 2;
   } catch (const std::exception& e) {
-    std::fprintf(stderr, "%s: %s\n", name.c_str(), first_line(e.what()).c_str());
+    say(first_line(e.what()));
     return 1;
   }
 }
@@ -102,27 +105,10 @@ void Progress::update(std::int64_t done, const std::string& note) {
   std::fflush(stderr);
 }
 
-int default_threads() { return static_cast<int>(std::max(1u, std::thread::hardware_concurrency())); }
-
-void parallel_for(std::int64_t count, int threads, const std::function<void(std::int64_t, int)>& body) {
-  std::atomic<std::int64_t> next{0};
-  std::exception_ptr error;
-  std::mutex error_mutex;
-  const auto work = [&](int thread) {
-    try {
-      for (std::int64_t i = next++; i < count; i = next++) body(i, thread);
-    } catch (...) {
-      const std::lock_guard<std::mutex> lock(error_mutex);
-      if (!error) error = std::current_exception();
-      next = count;
-    }
-  };
-  std::vector<std::thread> pool;
-  const int useful = static_cast<int>(std::min<std::int64_t>(threads, count));
-  for (int t = 1; t < useful; ++t) pool.emplace_back(work, t);
-  work(0);
-  for (std::thread& thread : pool) thread.join();
-  if (error) std::rethrow_exception(error);
+int default_threads() {
+  cpu_set_t allowed;
+  if (::sched_getaffinity(0, sizeof allowed, &allowed) == 0) return CPU_COUNT(&allowed);
+  return static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
 }
 
 }  // namespace dofusion

@@ -11,8 +11,9 @@
 namespace dofusion {
 
 // Adds --version and formats help; then parses, runs `body` and returns the exit status: 0 done, 2 bad arguments or
-// bad input (InputError, std::invalid_argument), 1 anything else. Errors are one line on stderr.
-int run_program(CLI::App& app, int argc, char** argv, const std::function<void()>& body);
+// bad input (InputError, std::invalid_argument), 1 anything else. Errors are one line on stderr, unless `speaks` is
+// false, as it is for all but the first of the processes that share one job.
+int run_program(CLI::App& app, int argc, char** argv, const std::function<void()>& body, bool speaks = true);
 
 // True once Ctrl-C (or a termination signal) has come; long loops look at it and leave complete files behind.
 // run_program installs the handler.
@@ -39,11 +40,7 @@ class Progress {
   Clock::time_point begin_, last_;
 };
 
-// Default for --threads: the processors of this machine.
+// Default for --threads: the processors that this process may run on.
 int default_threads();
-
-// Runs body(i) for i in [0, count) on `threads` threads, in order of i but not synchronised; the first exception stops
-// all and is thrown again.
-void parallel_for(std::int64_t count, int threads, const std::function<void(std::int64_t index, int thread)>& body);
 
 }  // namespace dofusion

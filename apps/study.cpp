@@ -15,6 +15,7 @@
 #include "stability/files.h"
 #include "stability/generation.h"
 #include "stability/mesh_io.h"
+#include "stability/parallel_for.h"
 #include "stability/shapes.h"
 
 namespace dofusion {
@@ -223,7 +224,7 @@ StudyScene StudyRunner::make_scene(std::int64_t index) {
   scene.truth = to_scene(shapes, generator.generate(index));
   Rng rng = make_rng(impl_->seed ^ kQuerySeed, static_cast<std::uint64_t>(index));
   const int query = uniform_int(rng, 0, static_cast<int>(shapes.shapes.size()) - 1);
-  scene.query = shapes.shapes[static_cast<std::size_t>(query)].object;
+  scene.query = shapes.shapes[static_cast<std::size_t>(query)];
   return scene;
 }
 

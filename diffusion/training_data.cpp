@@ -30,46 +30,30 @@ Pose mirrored(const Pose& pose) {
 
 }  // namespace
 
-TrainingSet::TrainingSet(std::vector<SceneDataset> datasets, const ModelConfig& config,
-                         const std::string& holdout_shape)
-    : config_(config) {
-  bool found_holdout = false;
+TrainingSet::TrainingSet(std::vector<SceneDataset> datasets, const ModelConfig& config) : config_(config) {
   for (SceneDataset& dataset : datasets) {
     const int first = static_cast<int>(shapes_.size());
-    for (BaseShape& base : dataset.shapes) {
-      Shape shape;
-      shape.volume = volume(base.mesh);
-      shape.convex = is_convex(base.mesh);
-      const BoundingBox box = bounding_box(base.mesh);
-      shape.box_edges = box.max - box.min;
-      shape.box = shape.convex && std::abs(shape.volume / shape.box_edges.prod() - 1.0) < 1e-6;
-      shape.mirrors = shape.convex && mirrors_in_y(base.mesh);
-      shape.base = std::move(base);
-      shapes_.push_back(std::move(shape));
+    for (const ObjectPtr& object : dataset.shapes) {
+      shapes_.push_back({object, object->convex && mirrors_in_y(object->mesh)});
     }
     for (SceneRecord& record : dataset.scenes) {
-      bool held_out = false;
       for (SceneObject& object : record.objects) {
         if (!object.T_world_object.matrix().allFinite() || !object.scale.allFinite())
           throw InputError("scene " + std::to_string(record.index) + " of the dataset has a pose that is not finite");
         object.shape += first;
-        held_out = held_out || shapes_[object.shape].base.name == holdout_shape;
       }
-      found_holdout = found_holdout || held_out;
-      if (!held_out && !record.objects.empty()) scenes_.push_back(std::move(record.objects));
+      if (!record.objects.empty()) scenes_.push_back(std::move(record.objects));
     }
   }
-  if (!holdout_shape.empty() && !found_holdout)
-    throw InputError("--holdout-shape: no scene of the data contains '" + holdout_shape + "'");
   if (scenes_.empty()) throw InputError("there is no scene to train on");
 }
 
 CloudShapePtr TrainingSet::cloud_shape(const Shape& shape, const Eigen::Vector3d& scale) const {
-  const TriangleMesh mesh = scaled(shape.base.mesh, scale);
-  if (!shape.convex) return std::make_shared<CloudShape>(*make_object(shape.base.name, mesh).object);
+  const Object& object = *shape.object;
+  if (!object.convex) return std::make_shared<CloudShape>(*scaled(object, scale));
   std::optional<Eigen::Vector3d> edges;
-  if (shape.box) edges = shape.box_edges.cwiseProduct(scale);
-  return std::make_shared<CloudShape>(mesh, edges);
+  if (object.box_edges) edges = object.box_edges->cwiseProduct(scale);
+  return std::make_shared<CloudShape>(scaled(object.mesh, scale), edges);
 }
 
 void TrainingSet::append(std::uint64_t seed, std::uint64_t example, NetworkInput& batch,
@@ -88,7 +72,7 @@ void TrainingSet::append(std::uint64_t seed, std::uint64_t example, NetworkInput
   for (const SceneObject& object : objects) {
     const Shape& shape = shapes_[object.shape];
     shapes.push_back(cloud_shape(shape, object.scale));
-    volumes.push_back(shape.volume * object.scale.prod());
+    volumes.push_back(shape.object->volume * object.scale.prod());
     const Pose pose = mirror ? mirrored(object.T_world_object) : object.T_world_object;
     poses.push_back(Pose(yaw * pose));
   }

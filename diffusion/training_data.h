@@ -15,9 +15,9 @@ namespace dofusion {
 
 class TrainingSet {
  public:
-  // Scenes with `holdout_shape` (if not empty) are left out. Throws InputError if that shape is in no dataset, if no
-  // scene is left, or if a pose is not finite.
-  TrainingSet(std::vector<SceneDataset> datasets, const ModelConfig& config, const std::string& holdout_shape = "");
+  // Throws InputError if there is no scene, or if a pose is not finite. Which scenes: DatasetFilter says it when the
+  // datasets are read.
+  TrainingSet(std::vector<SceneDataset> datasets, const ModelConfig& config);
 
   std::size_t scenes() const { return scenes_.size(); }
 
@@ -26,10 +26,7 @@ class TrainingSet {
 
  private:
   struct Shape {
-    BaseShape base;
-    double volume = 0.0;
-    bool box = false, convex = true;
-    Eigen::Vector3d box_edges = Eigen::Vector3d::Zero();
+    ObjectPtr object;      // at scale 1
     bool mirrors = false;  // its own mirror image in y
   };
   CloudShapePtr cloud_shape(const Shape& shape, const Eigen::Vector3d& scale) const;

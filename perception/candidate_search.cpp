@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "perception/parallel_for.h"
+#include "stability/parallel_for.h"
 
 namespace dofusion {
 namespace {
@@ -75,8 +75,8 @@ class Level {
 // Applies improve(worker, candidate) to every candidate.
 template <class Improve>
 void improve_all(std::vector<Candidate>& candidates, int threads, const Improve& improve) {
-  parallel_for(static_cast<int>(candidates.size()), threads,
-               [&](int worker, int i) { improve(worker, candidates[i]); });
+  parallel_for(static_cast<std::int64_t>(candidates.size()), threads,
+               [&](std::int64_t i, int worker) { improve(worker, candidates[static_cast<std::size_t>(i)]); });
 }
 
 }  // namespace

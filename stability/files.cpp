@@ -1,7 +1,10 @@
 #include "stability/files.h"
 
+#include <fcntl.h>
 #include <unistd.h>
 
+#include <cerrno>
+#include <cstring>
 #include <fstream>
 #include <sstream>
 #include <system_error>
@@ -43,21 +46,32 @@ std::string read_file(const fs::path& path) {
   return bytes.str();
 }
 
-void write_file(const fs::path& path, const std::string& bytes) {
+bool write_all(int file, const std::string& bytes) {
+  for (std::size_t done = 0; done < bytes.size();) {
+    const ssize_t written = ::write(file, bytes.data() + done, bytes.size() - done);
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return false;
+    done += static_cast<std::size_t>(written);
+  }
+  return true;
+}
+
+void write_file(const fs::path& path, const std::string& bytes, Durability durability) {
   // Devices, pipes and links (/dev/stdout is one) are written to, not replaced.
   std::error_code unknown;
   const fs::file_status status = fs::symlink_status(path, unknown);
   const bool in_place = fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
   const fs::path temporary = in_place ? path : temporary_name(path);
-  {
-    std::ofstream out(temporary, std::ios::binary);
-    out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    out.close();
-    if (!out) {
-      std::error_code ignored;
-      if (!in_place) fs::remove(temporary, ignored);
-      throw InputError(path.string() + ": cannot be written; does its folder exist and is it writable?");
-    }
+  const int file = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  bool good = file >= 0 && write_all(file, bytes);
+  if (good && durability == Durability::kOnDisk && !in_place) good = ::fsync(file) == 0;
+  int reason = good ? 0 : errno;
+  if (file >= 0 && ::close(file) != 0 && good) reason = errno;
+  if (reason != 0) {
+    std::error_code ignored;
+    if (!in_place) fs::remove(temporary, ignored);
+    throw InputError(path.string() + ": cannot be written (" + std::strerror(reason) + ")" +
+                     (file < 0 ? "; does its folder exist and is it writable?" : ""));
   }
   if (in_place) return;
   std::error_code error;

@@ -18,8 +18,14 @@ class InputError : public std::runtime_error {
 std::string read_file(const std::filesystem::path& path);
 
 // Writes `bytes` under a temporary name beside `path` and renames it; a device, pipe or link is written to as it is.
-// Throws InputError if that is not possible.
-void write_file(const std::filesystem::path& path, const std::string& bytes);
+// kOnDisk: the bytes are on the disk before the name is, so that not even a power cut leaves a part of them. Throws
+// InputError if that is not possible.
+enum class Durability { kWritten, kOnDisk };
+void write_file(const std::filesystem::path& path, const std::string& bytes,
+                Durability durability = Durability::kWritten);
+
+// Writes all of `bytes` to an open file; false, with the reason in errno, if that is not possible.
+bool write_all(int file, const std::string& bytes);
 
 // Throws InputError, as write_file would, if `path` cannot be written; for a look before long work.
 void check_writable(const std::filesystem::path& path);

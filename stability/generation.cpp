@@ -101,7 +101,7 @@ ShapeFamily shape_family_from_string(const std::string& name) {
 
 struct SceneGenerator::Impl {
   GenerationOptions options;
-  std::vector<BaseShape> shapes;
+  std::vector<ObjectPtr> shapes;
   std::vector<ObjectPtr> blocks;  // at their own size: shared by all scenes, so that their models are kept
   std::map<const Object*, std::vector<RestingPose>> resting;
   SimulatorCache simulators;
@@ -110,7 +110,7 @@ struct SceneGenerator::Impl {
   explicit Impl(const GenerationOptions& o) : options(o), simulators(o.physics, o.shapes == ShapeFamily::kBlocks ? 1024 : 16) {
     for (const std::string& name : block_names()) {
       blocks.push_back(make_block(name));
-      shapes.push_back({name, blocks.back()->mesh, blocks.back()});
+      shapes.push_back(blocks.back());
     }
   }
 
@@ -142,7 +142,7 @@ struct SceneGenerator::Impl {
       draw.shape = uniform_int(rng, 0, static_cast<int>(shapes.size()) - 1);
       const double factor = size / std::cbrt(blocks[draw.shape]->volume);
       draw.scale.setConstant(factor);
-      draw.object = make_block(shapes[draw.shape].name, factor);
+      draw.object = make_block(shapes[draw.shape]->name, factor);
     }
     return draw;
   }
@@ -318,7 +318,7 @@ SceneRecord SceneGenerator::generate(std::int64_t index) {
   }
 }
 
-const std::vector<BaseShape>& SceneGenerator::shapes() const { return impl_->shapes; }
+const std::vector<ObjectPtr>& SceneGenerator::shapes() const { return impl_->shapes; }
 const GenerationStatistics& SceneGenerator::statistics() const { return impl_->statistics; }
 
 std::string to_json(const GenerationOptions& o) {

@@ -45,7 +45,7 @@ class SceneGenerator {
   // A scene at rest: simulated until nothing moves, every object held by others or the table.
   SceneRecord generate(std::int64_t index);
 
-  const std::vector<BaseShape>& shapes() const;
+  const std::vector<ObjectPtr>& shapes() const;
   const GenerationStatistics& statistics() const;
 
  private:

@@ -13,7 +13,18 @@ with tempfile.TemporaryDirectory() as folder:
                     "--out", path], check=True)
     with h5py.File(path) as f:
         assert f.attrs["format"] in (b"dofusion-scenes", "dofusion-scenes"), f.attrs["format"]
-        assert json.loads(f.attrs["settings"])["seed"] == 4
+        assert f.attrs["version"] == 2
+        settings = json.loads(f.attrs["settings"])
+        assert settings["seed"] == 4
+        assert [part["count"] for part in settings["parts"]] == [20]
+        shapes = len(f["shapes/name"])
+        assert f["shapes/kind"].shape == (shapes,) and set(f["shapes/kind"][:]) <= {0, 1, 2, 3}
+        for name, table in (("vertex_start", "vertices"), ("triangle_start", "triangles")):
+            assert f["shapes/" + name].shape == (shapes + 1,) and f["shapes/" + name][-1] == len(f["shapes/" + table])
+            convex = f["shapes/convex_" + name]
+            assert len(convex) == f["shapes/convex_start"][-1] + 1 and convex[-1] == len(f["shapes/convex_" + table])
+        assert list(f["scenes/index"][:]) == list(range(20)) and not f["scenes/part"][:].any()
+        assert set(f["scenes/task"][:]) == {1} and set(f["scenes/split"][:]) <= {0, 1, 2}
         start = f["scenes/start"][:]
         assert list(start) == list(range(0, 42, 2)), start
         pose, scale, shape = f["objects/pose"][:], f["objects/scale"][:], f["objects/shape"][:]

@@ -1,15 +1,15 @@
 #include "tests/apps/run_command.h"
 
-#include <fcntl.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <stdexcept>
+
+#include <fcntl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "stability/files.h"
 #include "tests/temporary_directory.h"
@@ -20,41 +20,75 @@ namespace {
 constexpr rlim_t kProcessorSeconds = 600;
 
 // In the child, where nothing but calls to the system is safe.
-[[noreturn]] void execute(char* const* arguments, const char* out, const char* err) {
+[[noreturn]] void execute(char* const* arguments, const char* out, const char* err, rlim_t most_file_bytes) {
   const rlimit limit{kProcessorSeconds, kProcessorSeconds};
   ::setrlimit(RLIMIT_CPU, &limit);
   const int in_file = ::open("/dev/null", O_RDONLY);
   const int out_file = ::open(out, O_CREAT | O_WRONLY, 0600), err_file = ::open(err, O_CREAT | O_WRONLY, 0600);
   if (::dup2(in_file, 0) < 0 || ::dup2(out_file, 1) < 0 || ::dup2(err_file, 2) < 0) ::_exit(126);
+  const rlimit file_limit{most_file_bytes, most_file_bytes};
+  if (most_file_bytes > 0) ::setrlimit(RLIMIT_FSIZE, &file_limit);
   ::execv(arguments[0], arguments);
   ::_exit(127);
 }
 
 }  // namespace
 
-CommandResult run_command(const std::string& program, const std::vector<std::string>& arguments) {
-  const TemporaryDirectory directory;
-  const std::string out = directory / "out", err = directory / "err";
-  std::vector<std::string> words = {std::string(DOFUSION_BIN_DIR) + "/" + program};
-  words.insert(words.end(), arguments.begin(), arguments.end());
+RunningCommand::RunningCommand(std::vector<std::string> words, const CommandOptions& options)
+    : directory_(std::make_unique<TemporaryDirectory>()) {
+  const std::string out = *directory_ / "out", err = *directory_ / "err";
+  if (words.at(0).find('/') == std::string::npos) words[0] = std::string(DOFUSION_BIN_DIR) + "/" + words[0];
   std::vector<char*> pointers;
   for (std::string& word : words) pointers.push_back(word.data());
   pointers.push_back(nullptr);
+  child_ = ::fork();
+  if (child_ < 0) throw std::runtime_error(std::string("fork: ") + std::strerror(errno));
+  if (child_ == 0) {
+    execute(pointers.data(), out.c_str(), err.c_str(), static_cast<rlim_t>(options.most_file_bytes));
+  }
+}
 
-  const pid_t child = ::fork();
-  if (child < 0) throw std::runtime_error(std::string("fork: ") + std::strerror(errno));
-  if (child == 0) execute(pointers.data(), out.c_str(), err.c_str());
+RunningCommand::~RunningCommand() {
+  if (child_ < 0) return;
+  send(SIGKILL);
+  reap(0);
+}
+
+void RunningCommand::send(int signal_number) const {
+  if (child_ > 0) ::kill(child_, signal_number);
+}
+
+bool RunningCommand::ended() {
+  reap(WNOHANG);
+  return child_ < 0;
+}
+
+CommandResult RunningCommand::wait() {
+  reap(0);
+  result_.out = read_file(*directory_ / "out");
+  result_.err = read_file(*directory_ / "err");
+  return result_;
+}
+
+void RunningCommand::reap(int options) {
+  if (child_ < 0) return;
   int status = 0;
   rusage usage{};
-  while (::wait4(child, &status, 0, &usage) < 0) {
+  pid_t ended = 0;
+  while ((ended = ::wait4(child_, &status, options, &usage)) < 0) {
     if (errno != EINTR) throw std::runtime_error(std::string("wait4: ") + std::strerror(errno));
   }
-  CommandResult result;
-  result.status = WIFSIGNALED(status) ? -WTERMSIG(status) : WEXITSTATUS(status);
-  result.peak_mb = static_cast<double>(usage.ru_maxrss) / 1024.0;
-  result.out = read_file(out);
-  result.err = read_file(err);
-  return result;
+  if (ended == 0) return;
+  child_ = -1;
+  result_.status = WIFSIGNALED(status) ? -WTERMSIG(status) : WEXITSTATUS(status);
+  result_.peak_mb = static_cast<double>(usage.ru_maxrss) / 1024.0;
+}
+
+CommandResult run_command(const std::string& program, const std::vector<std::string>& arguments,
+                          const CommandOptions& options) {
+  std::vector<std::string> words = {program};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  return RunningCommand(words, options).wait();
 }
 
 void expect_refusal(const CommandResult& result, const std::vector<std::string>& words) {
@@ -69,7 +103,8 @@ void expect_success(const CommandResult& result) { EXPECT_EQ(result.status, 0) <
 
 std::vector<std::string> entries(const std::string& folder) {
   std::vector<std::string> names;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) names.push_back(entry.path().filename().string());
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    names.push_back(entry.path().filename().string());
   std::sort(names.begin(), names.end());
   return names;
 }

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "perception/depth_io.h"
+#include "stability/dataset.h"
 #include "stability/files.h"
 #include "tests/apps/run_command.h"
 #include "tests/temporary_directory.h"
@@ -51,6 +52,21 @@ TEST(Scan, WritesABopDatasetThatTheSeedRepeats) {
   EXPECT_GT(readings, 160 * 120 / 2);  // a table 0.7 m away
 }
 
+TEST(Scan, TakesASplitOfADataset) {
+  const TemporaryDirectory directory;
+  write_file(directory / "recipe.json", R"({"test": 0.4, "parts": [{"task": "single", "count": 8}]})");
+  expect_success(
+      run_command("dofusion-generate", {"--recipe", directory / "recipe.json", "--out", directory / "d.h5"}));
+  DatasetFilter filter;
+  filter.split = Split::kTest;
+  const std::size_t scenes = read_dataset(directory / "d.h5", filter).scenes.size();
+  ASSERT_GT(scenes, 0u);
+  ASSERT_LT(scenes, 8u);
+  expect_success(run_command("dofusion-scan", {"--data", directory / "d.h5", "--data-split", "test", "--size", "160",
+                                               "120", "--json", directory / "s.json", "--out", directory / "scans"}));
+  EXPECT_EQ(json::parse(read_file(directory / "s.json")).at("scenes"), scenes);
+}
+
 TEST(Scan, BadInputIsRefusedAndLeavesNothing) {
   const TemporaryDirectory directory;
   const auto scan = [&](std::vector<std::string> arguments) {
@@ -64,6 +80,7 @@ TEST(Scan, BadInputIsRefusedAndLeavesNothing) {
   expect_refusal(scan({"--data", directory / "none.h5"}), {"none.h5", "no such"});
   write_file(directory / "bad.h5", "no HDF5 at all");
   expect_refusal(scan({"--data", directory / "bad.h5"}), {"bad.h5"});
+  expect_refusal(scan({"--data", directory / "bad.h5", "--data-split", "exam"}), {"exam", "validation"});
   expect_refusal(run_command("dofusion-scan", {"--count", "1", "--out", "/proc/x"}), {"/proc/x"});
   EXPECT_EQ(entries(directory.path()), std::vector<std::string>{"bad.h5"});
 }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "stability/dataset.h"
 #include "stability/files.h"
 #include "tests/apps/run_command.h"
 #include "tests/temporary_directory.h"
@@ -15,12 +16,14 @@ using nlohmann::json;
 class TrainTest : public testing::Test {
  protected:
   void SetUp() override {
-    expect_success(run_command("dofusion-generate", {"--task", "single", "--count", "40", "--out", directory_ / "d.h5"}));
-    write_file(directory_ / "small.json", R"({"points": 32, "neighbours": 4, "widths": [32], "embedding": 32, "hidden": 32})");
+    expect_success(
+        run_command("dofusion-generate", {"--task", "single", "--count", "40", "--out", directory_ / "d.h5"}));
+    write_file(directory_ / "small.json",
+               R"({"points": 32, "neighbours": 4, "widths": [32], "embedding": 32, "hidden": 32})");
   }
   CommandResult train(std::vector<std::string> arguments, const std::string& data = "d.h5") {
-    arguments.insert(arguments.end(), {"--data", directory_ / data, "--config", directory_ / "small.json", "--batch", "8",
-                                       "--warm-up", "2", "--threads", "2", "--out", directory_ / "m.safetensors"});
+    arguments.insert(arguments.end(), {"--data", directory_ / data, "--config", directory_ / "small.json", "--batch",
+                                       "8", "--warm-up", "2", "--threads", "2", "--out", directory_ / "m.safetensors"});
     return run_command("dofusion-train", arguments);
   }
   TemporaryDirectory directory_;
@@ -30,8 +33,9 @@ TEST_F(TrainTest, ItsModelIsEvaluated) {
   expect_success(train({"--steps", "20", "--json", directory_ / "train.json"}));
   EXPECT_EQ(json::parse(read_file(directory_ / "train.json")).at("steps"), 20);
   const auto evaluate = [&](const std::string& out) {
-    return run_command("dofusion-evaluate", {"--table", "single", "--model", directory_ / "m.safetensors", "--instances",
-                                             "7", "--steps", "3", "--seed", "5", "--json", directory_ / out});
+    return run_command("dofusion-evaluate",
+                       {"--table", "single", "--model", directory_ / "m.safetensors", "--instances", "7", "--steps",
+                        "3", "--seed", "5", "--json", directory_ / out});
   };
   const CommandResult run = evaluate("e.json");
   expect_success(run);
@@ -47,6 +51,20 @@ TEST_F(TrainTest, ItsModelIsEvaluated) {
   EXPECT_EQ(rows[7].at("paper_random"), 90.7);
   expect_success(evaluate("again.json"));
   EXPECT_EQ(read_file(directory_ / "again.json"), read_file(directory_ / "e.json"));
+}
+
+TEST_F(TrainTest, UsesTheTrainingScenesWithoutTheHeldOutShape) {
+  write_file(directory_ / "recipe.json", R"({"validation": 0.5, "parts": [{"task": "single", "count": 60}]})");
+  expect_success(
+      run_command("dofusion-generate", {"--recipe", directory_ / "recipe.json", "--out", directory_ / "half.h5"}));
+  DatasetFilter filter;
+  filter.split = Split::kTrain;
+  filter.without_shape = "hat";
+  const std::size_t scenes = read_dataset(directory_ / "half.h5", filter).scenes.size();
+  EXPECT_LT(scenes, 50u);
+  const CommandResult run = train({"--steps", "2", "--holdout-shape", "hat"}, "half.h5");
+  expect_success(run);
+  EXPECT_THAT(run.err, testing::HasSubstr(std::to_string(scenes) + " scenes, preset default"));
 }
 
 TEST_F(TrainTest, BadInputIsRefused) {
@@ -73,8 +91,9 @@ TEST(Evaluate, BadInputIsRefused) {
   expect_refusal(run_command("dofusion-evaluate", {"--instances", "0"}), {"--instances"});
   write_file(directory / "bad.safetensors", "weights");
   expect_refusal(run_command("dofusion-evaluate", {"--model", directory / "bad.safetensors"}), {"bad.safetensors"});
-  expect_refusal(run_command("dofusion-evaluate", {"--instances", "1", "--steps", "2", "--json", directory / "none/e.json"}),
-                 {"none/e.json", "cannot be written"});
+  expect_refusal(
+      run_command("dofusion-evaluate", {"--instances", "1", "--steps", "2", "--json", directory / "none/e.json"}),
+      {"none/e.json", "cannot be written"});
 }
 
 }  // namespace

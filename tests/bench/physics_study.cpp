@@ -12,6 +12,7 @@
 #include "stability/convex_hull.h"
 #include "stability/generation.h"
 #include "stability/outcome.h"
+#include "stability/parallel_for.h"
 
 namespace {
 

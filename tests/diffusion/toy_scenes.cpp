@@ -1,7 +1,6 @@
 #include "tests/diffusion/toy_scenes.h"
 
 #include "stability/random.h"
-#include "stability/shapes.h"
 
 namespace dofusion {
 namespace {
@@ -16,7 +15,7 @@ Pose on_table(Rng& rng, double z) {
 SceneDataset boxes_on_table(int count, std::uint64_t seed) {
   SceneDataset dataset;
   dataset.settings = "{}";
-  dataset.shapes = {{"box", box_mesh({0.06, 0.10, 0.04}), nullptr}};
+  dataset.shapes = {make_box("box", {0.06, 0.10, 0.04})};
   Rng rng = make_rng(seed);
   for (int i = 0; i < count; ++i) {
     SceneRecord record;
@@ -32,7 +31,7 @@ SceneDataset boxes_on_table(int count, std::uint64_t seed) {
 SceneDataset stacked_cubes(int count, std::uint64_t seed) {
   SceneDataset dataset;
   dataset.settings = "{}";
-  dataset.shapes = {{"cube", block_mesh("cube"), nullptr}};
+  dataset.shapes = {make_block("cube")};
   Rng rng = make_rng(seed);
   for (int i = 0; i < count; ++i) {
     SceneRecord record;
