@@ -7,7 +7,7 @@
 #include <mutex>
 #include <stdexcept>
 
-#include "stability/box_collision.h"
+#include "stability/face_contacts.h"
 #include "stability/files.h"
 
 namespace dofusion {
@@ -27,7 +27,7 @@ std::unique_lock<std::mutex> lock_reader() {
   std::unique_lock<std::mutex> lock(mutex);
   mju_user_warning = ignore_warning;
   mju_user_error = exit_on_error;
-  repair_box_collision();
+  use_face_contacts();
   return lock;
 }
 
