@@ -305,6 +305,13 @@ std::vector<TriangleMesh> convex_parts(const TriangleMesh& closed_mesh, const Co
   return parts;
 }
 
+ObjectPtr with_convex_parts(const ObjectPtr& object, const ConvexPartsOptions& options) {
+  if (object->convex || !object->parts.empty()) return object;
+  auto divided = std::make_shared<Object>(*object);
+  divided->parts = convex_parts(object->mesh, options);
+  return divided;
+}
+
 ConvexFit convex_fit(const TriangleMesh& closed_mesh, const std::vector<TriangleMesh>& parts, int lines_per_side) {
   TriangleMesh all;
   for (const TriangleMesh& part : parts) {

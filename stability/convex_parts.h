@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "stability/mesh.h"
+#include "stability/scene.h"
 
 namespace dofusion {
 
@@ -21,6 +22,10 @@ struct ConvexPartsOptions {
 // several shells are fine; a convex mesh comes back as its hull. Same input, same parts. Throws std::invalid_argument
 // if the mesh is not closed, has no volume or is inside out, or on bad options.
 std::vector<TriangleMesh> convex_parts(const TriangleMesh& closed_mesh, const ConvexPartsOptions& options = {});
+
+// The object with `parts` if it is not convex and has none yet; else the object itself. For whoever loads meshes: physics
+// would find them anew for every model.
+ObjectPtr with_convex_parts(const ObjectPtr& object, const ConvexPartsOptions& options = {});
 
 // How far the union of convex `parts` is from the solid of a closed mesh, in shares of the solid's volume.
 struct ConvexFit {

@@ -8,12 +8,12 @@
 #include <stdexcept>
 
 #include "stability/resting_poses.h"
+#include "stability/shape_families.h"
 #include "stability/shapes.h"
 
 namespace dofusion {
 namespace {
 
-constexpr int kBoxBase = 0;            // index of the cube among the base shapes: scaled, it is every box
 constexpr int kTriesPerDropped = 12;   // drops of one object before the scene is begun anew
 constexpr int kTriesPerStacked = 4;    // the same in stacks, where what lies below decides more
 constexpr double kGravity = 9.81;
@@ -24,8 +24,10 @@ constexpr double kOverReach = 0.3, kNearReach = 0.9;     // of the sum of the tw
 constexpr double kLeastShove = 0.9, kLargestShove = 1.1;  // of the object's weight
 constexpr double kShoveSeconds = 0.4;                     // simulated
 constexpr double kLongestDrop = 2.0;                     // simulated seconds; what still moves then is dropped anew
-constexpr double kLargestAspect = 6.0;
-constexpr double kLargestSizeRatio = 3.0;
+constexpr double kLargestSizeRatio = 3.0;                // between the diameters of two objects of a scene
+constexpr double kStretch = 0.25;                        // of general shapes along x and y, in logarithms
+constexpr int kShapesPerFamily = 64;                     // of every family, stretched and scaled from scene to scene
+constexpr std::uint64_t kShapeStream = 0x5ca1ab1e0ddba11ull;  // apart from the numbers that scenes draw
 
 // World-frame bounding box of an object at a pose.
 BoundingBox world_box(const Object& object, const Pose& T_world_object) {
@@ -101,17 +103,40 @@ ShapeFamily shape_family_from_string(const std::string& name) {
 
 struct SceneGenerator::Impl {
   GenerationOptions options;
-  std::vector<ObjectPtr> shapes;
-  std::vector<ObjectPtr> blocks;  // at their own size: shared by all scenes, so that their models are kept
+  std::vector<ObjectPtr> shapes;  // blocks at their own size are shared by all scenes, so that their models are kept
+  struct Range {
+    int first = 0, last = 0;
+  };
+  std::vector<Range> families;  // of general scenes, in `shapes`
   std::map<const Object*, std::vector<RestingPose>> resting;
   SimulatorCache simulators;
   GenerationStatistics statistics;
 
-  explicit Impl(const GenerationOptions& o) : options(o), simulators(o.physics, o.shapes == ShapeFamily::kBlocks ? 1024 : 16) {
-    for (const std::string& name : block_names()) {
-      blocks.push_back(make_block(name));
-      shapes.push_back(blocks.back());
+  explicit Impl(const GenerationOptions& o)
+      : options(o), simulators(o.physics, o.shapes == ShapeFamily::kBlocks ? 1024 : 16) {
+    if (o.shapes == ShapeFamily::kBlocks) {
+      shapes = all_blocks();
+    } else {
+      draw_families();
     }
+  }
+
+  // The base shapes of general scenes: a few of every family, drawn from the seed, and the blocks as one family more.
+  void draw_families() {
+    const auto add_family = [&](std::vector<ObjectPtr> family) {
+      const int first = static_cast<int>(shapes.size());
+      families.push_back({first, first + static_cast<int>(family.size()) - 1});
+      shapes.insert(shapes.end(), family.begin(), family.end());
+    };
+    for (const std::string& name : shape_family_names()) {
+      std::vector<ObjectPtr> family;
+      for (int i = 0; i < kShapesPerFamily; ++i) {
+        Rng rng = make_rng(options.seed ^ kShapeStream, shapes.size() + family.size());
+        family.push_back(draw_shape(shape_family_kind_from_string(name), rng));
+      }
+      add_family(std::move(family));
+    }
+    add_family(all_blocks());
   }
 
   // One object's shape and scale.
@@ -125,31 +150,33 @@ struct SceneGenerator::Impl {
     Draw draw;
     if (options.shapes == ShapeFamily::kBlocks) {
       draw.shape = uniform_int(rng, 0, static_cast<int>(shapes.size()) - 1);
-      draw.object = blocks[draw.shape];
+      draw.object = shapes[draw.shape];
       return draw;
     }
-    // Sizes (cube roots of volumes) lie within a factor of three about that of the 50 mm cube.
-    const double size = 2.0 * kBlockUnit * std::exp(uniform(rng, -0.5, 0.5) * std::log(kLargestSizeRatio));
-    if (uniform(rng) < 0.75) {
-      const double longest = std::exp(uniform(rng, 0.0, std::log(kLargestAspect)));
-      Eigen::Vector3d edges(1.0, std::exp(uniform(rng, 0.0, std::log(longest))), longest);
-      std::shuffle(edges.data(), edges.data() + 3, rng);
-      edges *= size / std::cbrt(edges.prod());
-      draw.shape = kBoxBase;
-      draw.scale = edges / (2.0 * kBlockUnit);
-      draw.object = make_box("box", edges);
-    } else {
-      draw.shape = uniform_int(rng, 0, static_cast<int>(shapes.size()) - 1);
-      const double factor = size / std::cbrt(blocks[draw.shape]->volume);
-      draw.scale.setConstant(factor);
-      draw.object = make_block(shapes[draw.shape]->name, factor);
-    }
+    // Each family as often as any other; diameters lie within a factor of three about that of the 50 mm cube.
+    const Range family = families[uniform_int(rng, 0, static_cast<int>(families.size()) - 1)];
+    draw.shape = uniform_int(rng, family.first, family.last);
+    const double wanted = kShapeDiameter * std::exp(uniform(rng, -0.5, 0.5) * std::log(kLargestSizeRatio));
+    const Eigen::Vector3d stretch = draw_stretch(shapes[draw.shape]->kind, rng);
+    draw.scale = stretch * (wanted / diameter(scaled(shapes[draw.shape]->mesh, stretch)));
+    draw.object = scaled(*shapes[draw.shape], draw.scale);
     return draw;
   }
 
+  // Proportions beyond those of the drawn shapes. Boxes have all of theirs already.
+  static Eigen::Vector3d draw_stretch(SolidKind kind, Rng& rng) {
+    const double x = std::exp(uniform(rng, -kStretch, kStretch)), y = std::exp(uniform(rng, -kStretch, kStretch));
+    switch (kind) {
+      case SolidKind::kBox:
+      case SolidKind::kSphere: return Eigen::Vector3d::Ones();
+      case SolidKind::kCylinder: return {x, x, 1.0};
+      case SolidKind::kMesh: return {x, y, 1.0};
+    }
+    return Eigen::Vector3d::Ones();
+  }
+
   const std::vector<RestingPose>& resting_of(const Object& object, std::vector<RestingPose>& own) {
-    const auto is_shared = std::any_of(blocks.begin(), blocks.end(), [&](const auto& b) { return b.get() == &object; });
-    if (!is_shared) return own = resting_poses(object.mesh);
+    if (options.shapes != ShapeFamily::kBlocks) return own = resting_poses(object.mesh);
     auto& kept = resting[&object];
     if (kept.empty()) kept = resting_poses(object.mesh);
     return kept;

@@ -14,7 +14,7 @@ namespace dofusion {
 
 enum class ShapeFamily {
   kBlocks,   // the seven blocks at their own size
-  kGeneral,  // three boxes of random proportions (1:1 to 1:6) to one block, sizes in a scene differing up to 3 times
+  kGeneral,  // the families of shape_families.h and the blocks, ten kinds in equal shares, diameters up to 3 times apart
 };
 ShapeFamily shape_family_from_string(const std::string& name);  // "blocks" or "general"; std::invalid_argument
 

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "stability/convex_hull.h"
+#include "stability/convex_parts.h"
 #include "stability/files.h"
 #include "stability/mesh_io.h"
 
@@ -42,7 +43,7 @@ Body make_body(const Object& object, const std::string& file) {
   Body body{object, {}, {}, file};
   if (object.kind != SolidKind::kMesh) return body;
   body.solids = object.parts;
-  if (body.solids.empty()) body.solids = {object.mesh};
+  if (body.solids.empty()) body.solids = object.convex ? std::vector<TriangleMesh>{object.mesh} : convex_parts(object.mesh);
   body.corners = object.convex ? object.mesh.vertices : convex_hull(object.mesh.vertices).vertices;
   if (body.corners.size() > kMostCorners) body.corners.clear();
   return body;
@@ -53,7 +54,7 @@ bool is_round(const Object& object) {
 }
 
 // A mesh that the file shows but nothing touches, where convex parts stand for it.
-bool is_shown_apart(const Body& body) { return !body.file.empty() && !body.object.parts.empty(); }
+bool is_shown_apart(const Body& body) { return !body.file.empty() && !body.object.convex; }
 
 std::string solid_name(std::size_t index, std::size_t part) {
   return "mesh_" + std::to_string(index) + (part == 0 ? "" : "_" + std::to_string(part));
@@ -75,7 +76,7 @@ void write_assets(std::ostream& out, const Body& body, std::size_t index) {
   if (is_shown_apart(body)) write_mesh_file(out, "shown_" + std::to_string(index), body.file);
   for (std::size_t part = 0; part < body.solids.size(); ++part) {
     const std::string name = solid_name(index, part);
-    if (!body.file.empty() && body.object.parts.empty()) {
+    if (!body.file.empty() && body.object.convex) {
       write_mesh_file(out, name, body.file);
     } else {
       write_mesh(out, name, body.solids[part]);
@@ -140,7 +141,8 @@ void write_body(std::ostream& out, const Body& body, std::size_t index, const Po
   out << "    </body>\n";
 }
 
-// Room for contacts: eight for each pair of convex solids that may well meet, and every corner on the table.
+// Room for contacts: eight for each pair of convex solids that may well meet, and every corner on the table; but no
+// more than a heap of objects ever has, for MuJoCo keeps a square matrix of them.
 std::size_t contact_room(const std::vector<Body>& bodies) {
   constexpr std::size_t kPerPair = 8, kMostPairs = 8;  // of solids of the same two objects, or of an object and the table
   std::size_t contacts = kPerPair;
@@ -149,12 +151,11 @@ std::size_t contact_room(const std::vector<Body>& bodies) {
     contacts += bodies[i].corners.empty() ? kPerPair * std::min(kMostPairs, solids(i)) : bodies[i].corners.size();
     for (std::size_t j = 0; j < i; ++j) contacts += kPerPair * std::min(kMostPairs, std::max(solids(i), solids(j)));
   }
-  return contacts;
+  return std::min(contacts, 24 * (1 + bodies.size()));
 }
 
 void write_settings(std::ostream& out, const std::vector<Body>& bodies, const PhysicsOptions& options) {
   const std::size_t contacts = contact_room(bodies);
-  const bool round = std::any_of(bodies.begin(), bodies.end(), [](const Body& b) { return is_round(b.object); });
   out << "  <compiler angle=\"radian\" balanceinertia=\"true\"/>\n"
       // Elliptic cones and a high impratio keep friction from creeping. No-slip iterations would halve what creeping is
       // left, cost a third more, and make lying cylinders tremble.
@@ -162,7 +163,7 @@ void write_settings(std::ostream& out, const std::vector<Body>& bodies, const Ph
       // A face must rest on more than one point.
       << "    <flag multiccd=\"enable\"/>\n"
       << "  </option>\n"
-      << "  <size nconmax=\"" << contacts << "\" njmax=\"" << (round ? 6 : 4) * contacts << "\" nstack=\""
+      << "  <size nconmax=\"" << contacts << "\" njmax=\"" << 4 * contacts << "\" nstack=\""
       << 100000 * (1 + bodies.size()) << "\"/>\n"
       << "  <default>\n"
       << "    <geom friction=\"" << options.friction << " 0.005 0.0001\" condim=\"4\" solref=\"" << options.contact_time

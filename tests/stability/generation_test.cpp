@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "stability/metrics.h"
 
 namespace dofusion {
@@ -64,24 +66,28 @@ TEST(SceneGenerator, InStacksEachObjectStandsOnTheOneBefore) {
   }
 }
 
-TEST(SceneGenerator, GeneralSizesDifferByAtMostThree) {
+TEST(SceneGenerator, GeneralScenesDrawFromAllFamiliesWithSizesAtMostThreeApart) {
   GenerationOptions options;
   options.objects = 3;
   options.shapes = ShapeFamily::kGeneral;
   SceneGenerator generator(options);
   const SceneDataset shapes = shapes_of(generator);
-  for (int i = 0; i < 10; ++i) {
+  std::set<std::string> names;
+  for (int i = 0; i < 25; ++i) {
     const Scene scene = to_scene(shapes, generator.generate(i));
     double smallest = 1e9, largest = 0;
     for (const ObjectPtr& object : scene.objects) {
-      smallest = std::min(smallest, std::cbrt(object->volume));
-      largest = std::max(largest, std::cbrt(object->volume));
+      names.insert(object->name);
+      smallest = std::min(smallest, object->diameter);
+      largest = std::max(largest, object->diameter);
       if (object->box_edges) {
-        EXPECT_LE(object->box_edges->maxCoeff() / object->box_edges->minCoeff(), 6.0 + 1e-9);
+        EXPECT_LE(object->box_edges->maxCoeff() / object->box_edges->minCoeff(), 8.0 + 1e-9);
       }
+      EXPECT_EQ(object->convex, object->parts.empty()) << object->name;
     }
-    EXPECT_LE(largest / smallest, 3.0 + 1e-9);
+    EXPECT_LE(largest / smallest, 3.0 + 1e-6);  // a tessellated cylinder's diameter is its round one's to a millionth
   }
+  EXPECT_GE(names.size(), 8u);  // of 9 families and 7 blocks, in 75 objects
 }
 
 TEST(SceneGenerator, RefusesImpossibleCounts) {
