@@ -56,9 +56,6 @@ int main(int argc, char** argv) {
     write_outputs(output.path().string(), inputs, arguments, result);
     if (!json.empty()) write_file(json, placements_json(inputs, arguments, result));
     output.commit();
-    if (!inputs.query->convex) {
-      std::fprintf(stderr, "note: %s is not convex; physics takes its convex hull\n", inputs.query->name.c_str());
-    }
     std::printf("%s\nreport: %s/report.html\n", summary_line(inputs, result).c_str(), out.c_str());
   });
 }

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <cstdio>
 #include <functional>
-#include <limits>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -62,21 +61,34 @@ struct Column {
 double translation(const Outcome& o) { return o.displacement.translation_pct; }
 double rotation(const Outcome& o) { return o.displacement.rotation_deg; }
 double stable_pct(const Outcome& o) { return o.stable ? 100.0 : 0.0; }
+double quiet_pct(const Outcome& o) { return o.quiet ? 100.0 : 0.0; }
+double tilted_pct(const Outcome& o) { return o.tilted ? 100.0 : 0.0; }
 double stacked_pct(const Outcome& o) { return o.stacked ? 100.0 : 0.0; }
+double penetration_mm(const Outcome& o) { return 1000.0 * o.initial_penetration; }
 
 std::vector<Column> columns_of(const std::string& table) {
   const Column stable{"Stable at 10 % and 10 deg (%)", {}, true, stable_pct};
+  // What neighbouring work reports.
+  const Column quiet{"Accumulated rotation below 10 deg (%)", {}, true, quiet_pct};
+  const Column tilted{"Tilted by more than 20 deg (%)", {}, true, tilted_pct};
+  const Column penetration{"Penetration at the start (mm)", {}, false, penetration_mm};
   if (table == "single") {
     return {{"Translational Displacement (%)", kSingleTranslation, false, translation},
             {"Rotational Displacement (deg)", kSingleRotation, false, rotation},
-            stable};
+            stable,
+            quiet,
+            tilted,
+            penetration};
   }
-  if (table == "stack-one") return {{"Success rate (%)", kStackOne, true, stacked_pct}};
-  if (table == "stack-two") return {{"Success rate (%)", kStackTwo, true, stacked_pct}};
+  if (table == "stack-one") return {{"Success rate (%)", kStackOne, true, stacked_pct}, stable, quiet, tilted, penetration};
+  if (table == "stack-two") return {{"Success rate (%)", kStackTwo, true, stacked_pct}, stable, quiet, tilted, penetration};
   if (table == "unstructured") {
     return {{"Trans. Disp. (%)", kUnstructuredTranslation, false, translation},
             {"Rot. Disp. (deg)", kUnstructuredRotation, false, rotation},
-            stable};
+            stable,
+            quiet,
+            tilted,
+            penetration};
   }
   throw std::invalid_argument("unknown table '" + table + "'; choose single, stack-one, stack-two or unstructured");
 }
@@ -93,12 +105,6 @@ Estimate estimate(const std::vector<double>& values, bool mean, Rng& rng) {
   double sum = 0.0;
   for (const double v : values) sum += v;
   return {sum / static_cast<double>(values.size()), bootstrap_mean(values, rng)};
-}
-
-bool stands_as_stack(const SettleResult& settled, int objects) {
-  std::vector<std::pair<int, int>> expected;
-  for (int i = 0; i < objects; ++i) expected.emplace_back(i - 1, i);
-  return settled.status == SettleStatus::kSettled && settled.touching == expected;
 }
 
 }  // namespace
@@ -152,17 +158,7 @@ std::vector<Outcome> settle_placements(const std::vector<Instance>& instances, c
     objects.push_back(instance.query);
     start.push_back(T_world_query[static_cast<std::size_t>(i)]);
     const SettleResult settled = simulators[static_cast<std::size_t>(thread)]->get(objects).settle(start);
-    Outcome& outcome = outcomes[static_cast<std::size_t>(i)];
-    outcome.status = settled.status;
-    outcome.initial_penetration = settled.initial_penetration;
-    if (settled.status == SettleStatus::kDiverged) {
-      const double inf = std::numeric_limits<double>::infinity();
-      outcome.displacement = {inf, inf};
-      return;
-    }
-    outcome.displacement = displacement(objects, start, settled.T_world_object);
-    outcome.stable = settled.status == SettleStatus::kSettled && is_stable(outcome.displacement);
-    outcome.stacked = stands_as_stack(settled, static_cast<int>(objects.size()));
+    outcomes[static_cast<std::size_t>(i)] = judge(objects, start, settled, static_cast<int>(objects.size()) - 1);
   });
   return outcomes;
 }

@@ -9,8 +9,7 @@
 
 #include "diffusion/sampler.h"
 #include "stability/dataset.h"
-#include "stability/metrics.h"
-#include "stability/physics.h"
+#include "stability/outcome.h"
 
 namespace dofusion {
 
@@ -19,14 +18,6 @@ struct Instance {
   Scene context;
   ObjectPtr query;
   Task task = Task::kSingle;
-};
-
-struct Outcome {
-  SettleStatus status = SettleStatus::kDiverged;
-  Displacement displacement;       // infinite if the simulation diverged
-  bool stable = false;             // settled within 10 % and 10°
-  bool stacked = false;            // every object stands on the one before and on nothing else, the query on top
-  double initial_penetration = 0;  // metres
 };
 
 struct InstanceOptions {

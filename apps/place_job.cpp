@@ -13,6 +13,7 @@
 #include "perception/cloud_io.h"
 #include "perception/depth_io.h"
 #include "perception/mesh_sdf.h"
+#include "stability/convex_parts.h"
 #include "stability/files.h"
 #include "stability/mesh_io.h"
 #include "stability/mjcf.h"
@@ -22,7 +23,7 @@ namespace dofusion {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr std::size_t kMostTriangles = 100000;        // of a mesh: beyond, its physics takes minutes
+constexpr std::size_t kMostTriangles = 100000;        // of a mesh: beyond, finding its convex parts takes minutes
 
 // The solid of a mesh file; `unit_option` is the argument that says its unit.
 ObjectAndOffset load_solid(const std::string& file, double unit, const std::string& unit_option) {
@@ -34,6 +35,7 @@ ObjectAndOffset load_solid(const std::string& file, double unit, const std::stri
                        std::to_string(kMostTriangles) + " or fewer");
     }
     solid = make_object(fs::path(file).stem().string(), mesh);
+    solid.object = with_convex_parts(solid.object);
   } catch (const std::invalid_argument& e) {
     throw InputError(file + ": " + e.what());
   }

@@ -5,6 +5,7 @@
 
 #include "perception/shape_score.h"
 #include "perception/stacking.h"
+#include "stability/convex_parts.h"
 
 namespace dofusion {
 namespace {
@@ -89,7 +90,7 @@ RecoveredObject to_object(const Body& body, int index, const ShapeEvidence& evid
   const Eigen::Matrix3d& R = body.shape.R;
   for (Eigen::Vector3d& v : local.vertices) v = R.transpose() * v;
   const ObjectAndOffset made = make_object(result.name, local);
-  result.object = made.object;
+  result.object = with_convex_parts(made.object);
   result.T_world_object = make_pose(R, R * made.origin);
   return result;
 }

@@ -45,7 +45,7 @@ TEST(Simulator, ATiltedBoxFallsAndATowerOfTwoStands) {
 }
 
 TEST(Simulator, ASettledSceneStays) {
-  // Measured over 300 scenes (tests/bench): 99th percentile 0.04 % or degrees, largest 0.1.
+  // Measured over 1,000 scenes (physics_study): 99th percentile 0.04 % or degrees.
   const std::vector<ObjectPtr> objects = {make_block("tall_triangle"), make_block("hat"), make_block("tetrahedron")};
   const Simulator simulator(objects);
   Rng rng = make_rng(11);
@@ -58,8 +58,8 @@ TEST(Simulator, ASettledSceneStays) {
     if (first.status != SettleStatus::kSettled) continue;
     const SettleResult second = simulator.settle(first.T_world_object);
     const Displacement moved = displacement(objects, first.T_world_object, second.T_world_object);
-    EXPECT_LT(moved.translation_pct, 0.3);
-    EXPECT_LT(moved.rotation_deg, 0.3);
+    EXPECT_LT(moved.translation_pct, 0.1);
+    EXPECT_LT(moved.rotation_deg, 0.1);
   }
 }
 
@@ -252,6 +252,44 @@ TEST(Simulator, PenetrationOfTwoBoxesIsTheOverlapWhateverTouches) {
   EXPECT_NEAR(cubes.settle({face, turned({0, 0, 0.1}, 0.25 - overlap)}).initial_penetration, overlap, 1e-6);
   EXPECT_NEAR(cubes.settle({face, turned({M_PI / 4, 0, 0}, 0.225 + h - overlap)}).initial_penetration, overlap, 1e-6);
   EXPECT_NEAR(cubes.settle({edge_y, turned({M_PI / 4, 0, 0}, 0.2 + 2 * h - overlap)}).initial_penetration, overlap, 1e-6);
+}
+
+TEST(Simulator, FacesOnFacesDoNotTremble) {
+  // Wedges on blocks and on each other, and eight-sided prisms: with contacts from turned copies they rock by a tenth of
+  // a degree for ever. Let go a hundredth of a millimetre above each other, they settle by that and stay.
+  std::vector<Eigen::Vector2d> octagon;
+  for (int i = 0; i < 8; ++i) octagon.emplace_back(0.03 * std::cos(M_PI / 4 * i), 0.03 * std::sin(M_PI / 4 * i));
+  const ObjectPtr column = make_object("column", prism_mesh(octagon, -0.02, 0.02)).object;
+  for (const auto& [below, above] : {std::pair{make_block("half_rectangle"), make_block("middle_triangle")},
+                                     {make_block("cube"), make_block("tetrahedron")},
+                                     {column, make_block("hat")},
+                                     {column, column}}) {
+    const BoundingBox box = bounding_box(below->mesh);
+    const Simulator simulator({below, above});
+    for (const RestingPose& rest : resting_poses(above->mesh)) {
+      const double height = box.max.z() - box.min.z() + rest.height + 1e-5;
+      const std::vector<Pose> start = {at(0, 0, -box.min.z()), make_pose(rest.R_world_object, {0.002, 0.001, height})};
+      const SettleResult first = simulator.settle(start);
+      EXPECT_EQ(first.status, SettleStatus::kSettled) << above->name << " on " << below->name;
+      EXPECT_LT(first.seconds, 0.3) << above->name << " on " << below->name;
+      const Displacement moved = displacement({below, above}, start, first.T_world_object);
+      EXPECT_LT(moved.translation_pct, 0.1) << above->name << " on " << below->name;
+      EXPECT_LT(moved.rotation_deg, 0.1) << above->name << " on " << below->name;
+    }
+  }
+}
+
+TEST(Simulator, ParallelEdgesThatJustTouchAreNoOverlap) {
+  // MuJoCo's own box-box collision says half a metre for some of these angles.
+  const ObjectPtr wall = make_box("wall", {0.05, 0.4, 0.4}), plank = make_box("plank", {0.2, 0.05, 0.004});
+  const Simulator simulator({wall, plank}, {}, {true, false});
+  for (int i = 0; i < 200; ++i) {
+    const double angle = 0.4 + 0.005 * i, c = std::cos(angle), s = std::sin(angle);
+    const Pose leaning = make_pose(so3_exp({0, -angle, 0}), {-(0.2 * c + 0.004 * s) / 2, 0, (0.2 * s + 0.004 * c) / 2});
+    const SettleResult result = simulator.run({at(0.025, 0, 0.2), leaning}, {}, {0.02, false});
+    EXPECT_NE(result.status, SettleStatus::kDiverged) << angle;
+    EXPECT_LT(result.initial_penetration, 1e-9) << angle;
+  }
 }
 
 TEST(Simulator, RefusesWrongCountsAndBadPoses) {
