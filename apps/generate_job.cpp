@@ -32,7 +32,9 @@ class SceneMaker {
     }
     const GenerationStatistics before = worker.generator->statistics();
     JournalEntry entry;
-    entry.scene = worker.generator->generate(planned.index);
+    std::optional<SceneRecord> scene = worker.generator->generate(planned.index, interrupted);
+    if (!scene) throw Interrupted("interrupted");
+    entry.scene = std::move(*scene);
     entry.scene.part = planned.part;
     const GenerationStatistics& after = worker.generator->statistics();
     entry.drops = after.drops - before.drops;

@@ -332,6 +332,10 @@ SceneGenerator::SceneGenerator(const GenerationOptions& options) {
 SceneGenerator::~SceneGenerator() = default;
 
 SceneRecord SceneGenerator::generate(std::int64_t index) {
+  return *generate(index, [] { return false; });
+}
+
+std::optional<SceneRecord> SceneGenerator::generate(std::int64_t index, const std::function<bool()>& stop) {
   Rng rng = make_rng(impl_->options.seed, static_cast<std::uint64_t>(index));
   while (true) {
     SceneRecord record;
@@ -339,7 +343,10 @@ SceneRecord SceneGenerator::generate(std::int64_t index) {
     record.index = index;
     Scene scene;
     bool whole = true;
-    for (int i = 0; i < impl_->options.objects && whole; ++i) whole = impl_->add_object(record, scene, rng);
+    for (int i = 0; i < impl_->options.objects && whole; ++i) {
+      if (stop()) return std::nullopt;
+      whole = impl_->add_object(record, scene, rng);
+    }
     if (whole) return record;
     ++impl_->statistics.restarts;
   }

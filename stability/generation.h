@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -44,6 +45,9 @@ class SceneGenerator {
 
   // A scene at rest: simulated until nothing moves, every object held by others or the table.
   SceneRecord generate(std::int64_t index);
+
+  // The same, or nullopt soon after `stop` has come true: a scene of many objects can take a second.
+  std::optional<SceneRecord> generate(std::int64_t index, const std::function<bool()>& stop);
 
   const std::vector<ObjectPtr>& shapes() const;
   const GenerationStatistics& statistics() const;
