@@ -28,16 +28,27 @@ Interval bootstrap(const std::vector<double>& values, Rng& rng, int resamples, S
 
 }  // namespace
 
+std::vector<double> diameters_of(const std::vector<ObjectPtr>& objects) {
+  std::vector<double> diameters;
+  for (const ObjectPtr& object : objects) diameters.push_back(object->diameter);
+  return diameters;
+}
+
 Displacement displacement(const std::vector<ObjectPtr>& objects, const std::vector<Pose>& before,
                           const std::vector<Pose>& after) {
-  if (before.size() != objects.size() || after.size() != objects.size()) {
+  return displacement(diameters_of(objects), before, after);
+}
+
+Displacement displacement(const std::vector<double>& diameters, const std::vector<Pose>& before,
+                          const std::vector<Pose>& after) {
+  if (before.size() != diameters.size() || after.size() != diameters.size()) {
     throw std::invalid_argument("displacement needs one pose per object");
   }
   Displacement largest;
-  for (std::size_t i = 0; i < objects.size(); ++i) {
+  for (std::size_t i = 0; i < diameters.size(); ++i) {
     const double moved = (after[i].translation() - before[i].translation()).norm();
     const double turned = rotation_angle(before[i].linear().transpose() * after[i].linear());
-    largest.translation_pct = std::max(largest.translation_pct, 100.0 * moved / objects[i]->diameter);
+    largest.translation_pct = std::max(largest.translation_pct, 100.0 * moved / diameters[i]);
     largest.rotation_deg = std::max(largest.rotation_deg, turned * 180.0 / M_PI);
   }
   return largest;

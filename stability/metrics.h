@@ -15,6 +15,9 @@ struct Displacement {
 
 Displacement displacement(const std::vector<ObjectPtr>& objects, const std::vector<Pose>& before,
                           const std::vector<Pose>& after);
+Displacement displacement(const std::vector<double>& diameters, const std::vector<Pose>& before,
+                          const std::vector<Pose>& after);
+std::vector<double> diameters_of(const std::vector<ObjectPtr>& objects);
 
 // Nothing moved more than 10 % of its diameter or 10 degrees.
 inline constexpr double kStableTranslationPct = 10.0;

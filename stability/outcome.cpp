@@ -23,11 +23,7 @@ bool is_stacked(const std::vector<ObjectPtr>& objects, const std::vector<Pose>& 
   return on_context && is_stable(displacement(context, context_before, context_after));
 }
 
-Outcome judge(const std::vector<ObjectPtr>& objects, const std::vector<Pose>& before, const SettleResult& settled,
-              int query) {
-  if (query < 0 || query >= static_cast<int>(objects.size())) {
-    throw std::invalid_argument("judge: there is no object " + std::to_string(query));
-  }
+Outcome judge(const std::vector<double>& diameters, const std::vector<Pose>& before, const SettleResult& settled) {
   Outcome outcome;
   outcome.status = settled.status;
   outcome.initial_penetration = settled.initial_penetration;
@@ -39,7 +35,7 @@ Outcome judge(const std::vector<ObjectPtr>& objects, const std::vector<Pose>& be
     return outcome;
   }
   const bool rests = settled.status == SettleStatus::kSettled;
-  outcome.displacement = displacement(objects, before, settled.T_world_object);
+  outcome.displacement = displacement(diameters, before, settled.T_world_object);
   for (const double turned : settled.turned) {
     outcome.accumulated_rotation_deg = std::max(outcome.accumulated_rotation_deg, turned * 180.0 / M_PI);
   }
@@ -47,6 +43,15 @@ Outcome judge(const std::vector<ObjectPtr>& objects, const std::vector<Pose>& be
   outcome.stable = rests && is_stable(outcome.displacement);
   outcome.quiet = rests && outcome.accumulated_rotation_deg < kQuietRotationDeg;
   outcome.tilted = outcome.tilt_deg > kTiltedDeg;
+  return outcome;
+}
+
+Outcome judge(const std::vector<ObjectPtr>& objects, const std::vector<Pose>& before, const SettleResult& settled,
+              int query) {
+  if (query < 0 || query >= static_cast<int>(objects.size())) {
+    throw std::invalid_argument("judge: there is no object " + std::to_string(query));
+  }
+  Outcome outcome = judge(diameters_of(objects), before, settled);
   outcome.stacked = is_stacked(objects, before, settled, query);
   return outcome;
 }

@@ -26,6 +26,10 @@ struct Outcome {
 bool is_stacked(const std::vector<ObjectPtr>& objects, const std::vector<Pose>& before, const SettleResult& settled,
                 int query);
 
+// Of bodies of these diameters, metres; without a query nothing is stacked. Throws std::invalid_argument unless there
+// is one pose per body.
+Outcome judge(const std::vector<double>& diameters, const std::vector<Pose>& before, const SettleResult& settled);
+
 // Throws std::invalid_argument unless there is one pose per object and `query` is one of them.
 Outcome judge(const std::vector<ObjectPtr>& objects, const std::vector<Pose>& before, const SettleResult& settled,
               int query);

@@ -52,8 +52,9 @@ Simulation::Simulation(ModelPtr model, std::vector<Body> bodies)
   reset();
 }
 
-void Simulation::reset() {
-  mj_resetData(model_.get(), data_.get());
+void Simulation::reset(int keyframe) {
+  mj_resetDataKeyframe(model_.get(), data_.get(), keyframe);
+  data_->time = 0.0;  // a keyframe has its own
 }
 
 void Simulation::start_at(const std::vector<Pose>& T_world_body) {
@@ -105,7 +106,7 @@ SettleResult Simulation::settle(const PhysicsOptions& options, const Loads& load
       mju_zero(data_->xfrc_applied, 6 * model_->nbody);
       pushed_for_a_while = false;
     }
-    mj_step(model_.get(), data_.get());
+    step(*model_, *data_);
     if (has_diverged(*data_)) {
       result.status = SettleStatus::kDiverged;
       break;
@@ -135,11 +136,16 @@ void Simulation::record(const Recording& recording) {
 
 // Collision once more, for surfaces up to kTouchingGap apart as well.
 void Simulation::find_near_contacts() {
-  std::vector<mjtNum> margins(model_->geom_margin, model_->geom_margin + model_->ngeom);
-  for (int g = 0; g < model_->ngeom; ++g) model_->geom_margin[g] = std::max(margins[static_cast<std::size_t>(g)], kTouchingGap);
+  struct WiderMargins {
+    explicit WiderMargins(mjModel& m) : model(m), own(m.geom_margin, m.geom_margin + m.ngeom) {
+      for (int g = 0; g < m.ngeom; ++g) m.geom_margin[g] = std::max(m.geom_margin[g], kTouchingGap);
+    }
+    ~WiderMargins() { std::copy(own.begin(), own.end(), model.geom_margin); }
+    mjModel& model;
+    std::vector<mjtNum> own;
+  } margins(*model_);
   mj_kinematics(model_.get(), data_.get());
-  mj_collision(model_.get(), data_.get());
-  std::copy(margins.begin(), margins.end(), model_->geom_margin);
+  collide(*model_, *data_);
 }
 
 double Simulation::deepest_penetration() const {

@@ -18,8 +18,8 @@ class Simulation {
   // `bodies` are those whose poses count; any others move along unseen.
   Simulation(ModelPtr model, std::vector<Body> bodies);
 
-  // To the model's own initial state, at rest.
-  void reset();
+  // To the model's own initial state, at rest, or to one of its keyframes.
+  void reset(int keyframe = -1);
   // At rest with the bodies, which have free joints or are MuJoCo's mocap bodies, at these poses.
   void start_at(const std::vector<Pose>& T_world_body);
   struct Recording {
@@ -34,6 +34,7 @@ class Simulation {
   std::vector<Pose> poses();
 
   const mjModel& model() const { return *model_; }
+  const mjData& data() const { return *data_; }
 
  private:
   struct RestWatch;
