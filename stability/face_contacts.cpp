@@ -15,7 +15,6 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kAlongFace = 0.9998;        // cosine between contact and face normal above which the face takes part
-constexpr double kSameFace = 1.0 - 1e-9;     // cosine between normals of triangles of one face
 constexpr int kMostCorners = 72;             // of a face; solids with rounder ones keep MuJoCo's contacts
 constexpr int kMostContacts = 8;             // of a pair; of more, those farthest from each other
 
@@ -77,39 +76,59 @@ void sort_corners(Face& face) {
   }
 }
 
-// The same of a convex mesh: all triangles in the plane of the one that looks most along `direction`.
-bool mesh_face(const mjModel& model, int mesh, const Vector3d& direction, Face& face) {
-  const float* vertices = model.mesh_vert + 3 * model.mesh_vertadr[mesh];
-  const int* triangles = model.mesh_face + 3 * model.mesh_faceadr[mesh];
-  const int count = model.mesh_facenum[mesh];
-  const auto vertex = [&](int i) { return Eigen::Map<const Eigen::Vector3f>(vertices + 3 * i).cast<double>().eval(); };
-  const auto normal_of = [&](int t) {
+// The convex hull of a mesh, which is what MuJoCo collides, as it lies in the model.
+struct Hull {
+  const float* vertices;       // of the mesh
+  const int* triangles;        // three of its vertices each
+  const int* corners;          // of its vertices, those of the hull; null: all
+  int triangle_count, corner_count;
+
+  Vector3d vertex(int i) const { return Eigen::Map<const Eigen::Vector3f>(vertices + 3 * i).cast<double>(); }
+  Vector3d corner(int i) const { return vertex(corners == nullptr ? i : corners[i]); }
+  // Outward, as long as twice the triangle's area; the origin, the mesh's centre of mass, lies inside.
+  Vector3d normal(int t) const {
     const Vector3d a = vertex(triangles[3 * t]);
-    return (vertex(triangles[3 * t + 1]) - a).cross(vertex(triangles[3 * t + 2]) - a).eval();
-  };
-  int best = -1;
-  double best_cosine = -2.0;
-  for (int t = 0; t < count; ++t) {
-    const Vector3d n = normal_of(t);
-    const double cosine = n.dot(direction) / n.norm();
-    if (!(cosine > best_cosine)) continue;  // also where a triangle has no area
+    const Vector3d n = (vertex(triangles[3 * t + 1]) - a).cross(vertex(triangles[3 * t + 2]) - a);
+    return n.dot(a) < 0.0 ? Vector3d(-n) : n;
+  }
+};
+
+Hull hull_of(const mjModel& model, int mesh) {
+  const float* vertices = model.mesh_vert + 3 * model.mesh_vertadr[mesh];
+  if (model.mesh_graphadr[mesh] < 0) {
+    return {vertices, model.mesh_face + 3 * model.mesh_faceadr[mesh], nullptr, model.mesh_facenum[mesh],
+            model.mesh_vertnum[mesh]};
+  }
+  // Numbers of corners V and triangles T; V edge addresses, V corners, V + 3 T edges, 3 T triangle corners.
+  const int* graph = model.mesh_graph + model.mesh_graphadr[mesh];
+  const int V = graph[0], T = graph[1];
+  return {vertices, graph + 2 + 3 * V + 3 * T, graph + 2 + V, T, V};
+}
+
+// The same of a mesh's hull: all corners in the plane of the triangle that looks most along `direction`.
+bool mesh_face(const mjModel& model, int mesh, const Vector3d& direction, Face& face) {
+  constexpr double kInPlane = 1e-5;  // of the distance from the middle to the plane, plus that much of a corner's
+  constexpr double kAsGood = 1e-6;   // between cosines: the larger triangle decides, since slivers have noisy normals
+  const Hull hull = hull_of(model, mesh);
+  Vector3d best = Vector3d::Zero();
+  double best_cosine = -2.0, offset = 0.0;
+  for (int t = 0; t < hull.triangle_count; ++t) {
+    const Vector3d n = hull.normal(t);
+    const double length = n.norm(), cosine = n.dot(direction) / length;
+    if (!(cosine > best_cosine - kAsGood)) continue;  // also where a triangle has no area
+    if (cosine < best_cosine + kAsGood && length < best.norm()) continue;
     best_cosine = cosine;
-    best = t;
+    best = n;
+    offset = n.dot(hull.vertex(hull.triangles[3 * t])) / length;
   }
-  if (best < 0) return false;
-  face.normal = normal_of(best).normalized();
-  std::array<int, kMostCorners> known;
-  for (int t = 0; t < count; ++t) {
-    const Vector3d n = normal_of(t);
-    if (n.dot(face.normal) < kSameFace * n.norm()) continue;
-    for (int k = 0; k < 3; ++k) {
-      const int index = triangles[3 * t + k];
-      if (std::find(known.begin(), known.begin() + face.size, index) != known.begin() + face.size) continue;
-      if (face.size == kMostCorners) return false;
-      known[face.size] = index;
-      face.add(vertex(index));
-    }
+  if (best_cosine < -1.0) return false;
+  face.normal = best.normalized();
+  for (int i = 0; i < hull.corner_count; ++i) {
+    const Vector3d corner = hull.corner(i);
+    if (face.normal.dot(corner) < offset - kInPlane * (offset + corner.norm())) continue;
+    if (!face.add(corner)) return false;
   }
+  if (face.size < 3) return false;
   sort_corners(face);
   return true;
 }
