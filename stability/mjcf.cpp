@@ -157,9 +157,8 @@ std::size_t contact_room(const std::vector<Body>& bodies) {
 void write_settings(std::ostream& out, const std::vector<Body>& bodies, const PhysicsOptions& options) {
   const std::size_t contacts = contact_room(bodies);
   out << "  <compiler angle=\"radian\" balanceinertia=\"true\"/>\n"
-      // Elliptic cones and a high impratio keep friction from creeping. No-slip iterations would halve what creeping is
-      // left, cost a third more, and make lying cylinders tremble.
-      << "  <option timestep=\"" << options.timestep << "\" cone=\"elliptic\" impratio=\"10\">\n"
+      // Elliptic cones and a high impratio keep friction from creeping.
+      << "  <option timestep=\"" << options.timestep << "\" cone=\"elliptic\" impratio=\"300\">\n"
       // A face must rest on more than one point.
       << "    <flag multiccd=\"enable\"/>\n"
       << "  </option>\n"

@@ -44,7 +44,7 @@ TEST_F(TrainTest, ItsModelIsEvaluated) {
   EXPECT_EQ(result.at("table"), "single");
   EXPECT_EQ(result.at("seed"), 5);
   const json& rows = result.at("rows");
-  ASSERT_EQ(rows.size(), 24u);  // seven blocks and all, three columns
+  ASSERT_EQ(rows.size(), 48u);  // seven blocks and all, six columns
   EXPECT_EQ(rows[7].at("block"), "All blocks");
   EXPECT_EQ(rows[7].at("instances"), 7);
   EXPECT_EQ(rows[7].at("paper"), 1.2);
