@@ -4,8 +4,10 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <sstream>
 
 #include <Eigen/Dense>
+#include <pcl/conversions.h>
 #include <pcl/io/pcd_io.h>
 #include <pcl/io/ply_io.h>
 #include <pcl/sample_consensus/ransac.h>
@@ -124,6 +126,15 @@ Cloud read_cloud(const std::string& path) {
   if (status < 0) throw InputError(path + ": cannot be read as a point cloud");
   if (cloud.empty()) throw InputError(path + ": has no points");
   return cloud;
+}
+
+void write_cloud(const Cloud& cloud, const std::string& path) {
+  pcl::PCLPointCloud2 blob;
+  pcl::toPCLPointCloud2(cloud, blob);
+  std::ostringstream bytes;
+  pcl::PCDWriter writer;
+  if (writer.writeBinary(bytes, blob) != 0) throw InputError(path + ": PCL cannot write these points");
+  write_file(path, bytes.str());
 }
 
 Cloud to_cloud(const DepthImage& depth, const Camera& camera) {

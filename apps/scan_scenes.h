@@ -1,0 +1,32 @@
+// The scenes of a scan and the models in them.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "stability/dataset.h"
+#include "stability/generation.h"
+
+namespace dofusion {
+
+// New scenes 0 … count - 1. `journal` keeps those that are made, so that the same call goes on after a kill. Throws
+// Interrupted if the user ends the program.
+SceneDataset generate_scenes(const GenerationOptions& options, std::int64_t count, int threads,
+                             const std::filesystem::path& journal);
+
+// Scenes of distinct solids, which are numbered from 1 as BOP's object ids.
+struct ScanScenes {
+  std::vector<ObjectPtr> models;
+  std::vector<Scene> scenes;          // equal objects are one and the same
+  std::vector<std::vector<int>> ids;  // per scene and object: index into models, plus 1
+};
+
+// Throws UnusableScene, naming the scene, if it has more than 253 objects, the most that labels of 8 bits tell apart.
+ScanScenes scan_scenes_of(const SceneDataset& dataset);
+
+// A hash of shapes and poses: the same scenes, wherever they come from. 16 hexadecimal digits.
+std::string fingerprint(const ScanScenes& scenes);
+
+}  // namespace dofusion
