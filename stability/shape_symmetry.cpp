@@ -12,9 +12,9 @@
 namespace dofusion {
 namespace {
 
-constexpr double kParallel = 1e-2;      // sine of the angle between axes that count as one
-constexpr double kSameRotation = 2e-2;  // Frobenius norm of the difference of matrices that count as one
-constexpr int kMostTurns = 12;          // of a rotation about the distinct principal axis
+constexpr double kParallel = 1e-2;     // sine of the angle between axes that count as one
+constexpr double kSameRotation = 0.2;  // Frobenius norm of the difference of matrices that count as one: 8 degrees
+constexpr int kMostTurns = 12;         // of a rotation about the distinct principal axis
 
 // Mean and covariance of the surface's points: they follow from the shape, not from its triangles.
 struct SurfaceMoments {
@@ -147,6 +147,24 @@ bool is_ball(const Surface& surface, double distance) {
   return points.front().norm() - points.back().norm() <= distance;
 }
 
+// Those of the candidates that keep the surface. Of candidates a few degrees apart, which a shape of many sides keeps
+// within the tolerance, the exact one counts.
+std::vector<Eigen::Matrix3d> distinct_symmetries(const Surface& surface, const std::vector<Eigen::Matrix3d>& candidates,
+                                                 double distance) {
+  std::vector<Eigen::Matrix3d> found;
+  const auto is_known = [&](const Eigen::Matrix3d& R) {
+    if ((R - Eigen::Matrix3d::Identity()).norm() < kSameRotation) return true;
+    return std::any_of(found.begin(), found.end(),
+                       [&](const Eigen::Matrix3d& other) { return (other - R).norm() < kSameRotation; });
+  };
+  for (const double strictness : {0.01, 0.1, 0.3, 1.0}) {
+    for (const Eigen::Matrix3d& R : candidates) {
+      if (!is_known(R) && surface.keeps(R, strictness * distance)) found.push_back(tidy(R));
+    }
+  }
+  return found;
+}
+
 // The symmetries about the origin.
 ShapeSymmetry symmetry_about_origin(const TriangleMesh& centred, const SurfaceMoments& moments, double tolerance) {
   ShapeSymmetry symmetry;
@@ -162,14 +180,7 @@ ShapeSymmetry symmetry_about_origin(const TriangleMesh& centred, const SurfaceMo
     if (surface.keeps(swap_ends, distance)) symmetry.rotations.push_back(tidy(swap_ends));
     return symmetry;
   }
-  std::vector<Eigen::Matrix3d> found = {Eigen::Matrix3d::Identity()};
-  for (const Eigen::Matrix3d& R : discrete_candidates(centred, axes, tolerance)) {
-    const bool known = std::any_of(found.begin(), found.end(),
-                                   [&](const Eigen::Matrix3d& other) { return (other - R).norm() < kSameRotation; });
-    if (known || !surface.keeps(R, distance)) continue;
-    found.push_back(R);
-    symmetry.rotations.push_back(tidy(R));
-  }
+  symmetry.rotations = distinct_symmetries(surface, discrete_candidates(centred, axes, tolerance), distance);
   return symmetry;
 }
 
