@@ -8,9 +8,9 @@
 #include <nlohmann/json.hpp>
 
 #include "perception/bop_dataset.h"
-#include "perception/model_symmetry.h"
 #include "stability/files.h"
 #include "stability/parallel_for.h"
+#include "stability/shape_symmetry.h"
 
 namespace dofusion {
 namespace {
@@ -58,23 +58,30 @@ std::string to_ply_mm(const TriangleMesh& mesh) {
 
 Json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
-Json symmetries_json(const ModelSymmetries& symmetries) {
-  Json discrete = Json::array(), continuous = Json::array();
-  for (const Pose& pose : symmetries.discrete) {
-    Eigen::Matrix4d matrix = pose.matrix();
-    matrix.topRightCorner<3, 1>() *= kMillimetres;
-    Json values = Json::array();
-    for (int k = 0; k < 16; ++k) values.push_back(matrix(k / 4, k % 4));
-    discrete.push_back(std::move(values));
+Json discrete_json(const Eigen::Matrix3d& R, const Eigen::Vector3d& centre) {
+  const Eigen::Vector3d t = kMillimetres * (centre - R * centre);
+  Json values = Json::array();
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) values.push_back(R(row, column));
+    values.push_back(t[row]);
   }
-  for (const ContinuousSymmetry& symmetry : symmetries.continuous) {
-    continuous.push_back(
-        {{"axis", vector_json(symmetry.axis)}, {"offset", vector_json(kMillimetres * symmetry.offset)}});
-  }
+  for (const double value : {0.0, 0.0, 0.0, 1.0}) values.push_back(value);
+  return values;
+}
+
+// As in BOP's own files, a list that would be empty is left out. A ball has three axes, at right angles.
+Json symmetries_json(const ShapeSymmetry& symmetry) {
+  std::vector<Eigen::Vector3d> axes;
+  if (symmetry.axis) axes = {*symmetry.axis};
+  if (symmetry.ball) axes = {Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitZ()};
+  const Json offset = vector_json(kMillimetres * symmetry.centre);
   Json json = Json::object();
-  // As in BOP's own files, a list that would be empty is left out.
-  if (!discrete.empty()) json["symmetries_discrete"] = std::move(discrete);
-  if (!continuous.empty()) json["symmetries_continuous"] = std::move(continuous);
+  for (const Eigen::Matrix3d& R : symmetry.rotations) {
+    json["symmetries_discrete"].push_back(discrete_json(R, symmetry.centre));
+  }
+  for (const Eigen::Vector3d& axis : axes) {
+    json["symmetries_continuous"].push_back({{"axis", vector_json(axis)}, {"offset", offset}});
+  }
   return json;
 }
 
@@ -88,7 +95,7 @@ Json model_info(const Object& object) {
             {"size_x", size.x()},
             {"size_y", size.y()},
             {"size_z", size.z()}};
-  json.update(symmetries_json(model_symmetries(object.mesh)));
+  json.update(symmetries_json(symmetry_of(object)));
   json["name"] = object.name;
   return json;
 }

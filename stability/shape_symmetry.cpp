@@ -1,22 +1,20 @@
-#include "perception/model_symmetry.h"
+#include "stability/shape_symmetry.h"
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include <Eigen/Dense>
 
-#include "perception/embree_handles.h"
 #include "stability/mesh_symmetry.h"
-#include "stability/signed_triangles.h"
+#include "stability/triangle_tree.h"
 
 namespace dofusion {
 namespace {
 
-constexpr double kParallel = 1e-2;      // sine of the angle between axes that count as one
-constexpr double kSameRotation = 2e-2;  // Frobenius norm of the difference of matrices that count as one
-constexpr int kMostTurns = 12;          // of a rotation about the distinct principal axis
+constexpr double kParallel = 1e-2;     // sine of the angle between axes that count as one
+constexpr double kSameRotation = 0.2;  // Frobenius norm of the difference of matrices that count as one: 8 degrees
+constexpr int kMostTurns = 12;         // of a rotation about the distinct principal axis
 
 // Mean and covariance of the surface's points: they follow from the shape, not from its triangles.
 struct SurfaceMoments {
@@ -46,27 +44,11 @@ SurfaceMoments surface_moments(const TriangleMesh& mesh) {
   return moments;
 }
 
-struct NearestQuery {
-  const std::vector<SignedTriangle>& triangles;
-  Eigen::Vector3d point;
-  double squared = std::numeric_limits<double>::infinity();
-};
-
-bool visit_triangle(RTCPointQueryFunctionArguments* arguments) {
-  NearestQuery& query = *static_cast<NearestQuery*>(arguments->userPtr);
-  query.squared =
-      std::min(query.squared, distance_to_triangle(query.triangles[arguments->primID], query.point).squared);
-  return false;
-}
-
 // A mesh about its centre, and the points by which rotations of it are judged: all corners, or as many as are enough,
 // and points spread over the surface.
 class Surface {
  public:
-  explicit Surface(const TriangleMesh& centred)
-      : triangles_(signed_triangles(centred)),
-        device_(make_embree_device()),
-        scene_(make_triangle_scene(device_.get(), centred)) {
+  explicit Surface(const TriangleMesh& centred) : tree_(centred) {
     constexpr std::size_t kVertices = 2000;
     constexpr int kSamples = 600;
     const std::size_t step = (centred.vertices.size() + kVertices - 1) / kVertices;
@@ -84,29 +66,13 @@ class Surface {
   // True if every point, rotated, lies within `distance` of the surface.
   bool keeps(const Eigen::Matrix3d& R, double distance) const {
     return std::all_of(points_.begin(), points_.end(),
-                       [&](const Eigen::Vector3d& point) { return is_near(R * point, distance); });
+                       [&](const Eigen::Vector3d& point) { return tree_.any_within(R * point, distance); });
   }
 
   const std::vector<Eigen::Vector3d>& points() const { return points_; }
 
  private:
-  bool is_near(const Eigen::Vector3d& point, double distance) const {
-    NearestQuery query{triangles_, point};
-    RTCPointQuery ball;
-    ball.x = static_cast<float>(point.x());
-    ball.y = static_cast<float>(point.y());
-    ball.z = static_cast<float>(point.z());
-    ball.time = 0.0f;
-    ball.radius = static_cast<float>(1.001 * distance);  // Embree culls in float
-    RTCPointQueryContext context;
-    rtcInitPointQueryContext(&context);
-    rtcPointQuery(scene_.get(), &ball, &context, visit_triangle, &query);
-    return query.squared <= distance * distance;
-  }
-
-  std::vector<SignedTriangle> triangles_;
-  EmbreeDevice device_;
-  EmbreeScene scene_;
+  TriangleTree tree_;
   std::vector<Eigen::Vector3d> points_;
 };
 
@@ -176,53 +142,71 @@ Eigen::Matrix3d tidy(const Eigen::Matrix3d& R) {
   return R.unaryExpr([](double x) { return std::abs(x - std::round(x)) < 1e-9 ? std::round(x) + 0.0 : x; });
 }
 
-Pose about_centre(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& centre) {
-  const Eigen::Matrix3d R = tidy(rotation);
-  return make_pose(R, centre - R * centre);
-}
-
 bool is_ball(const Surface& surface, double distance) {
   const auto& points = surface.points();  // by falling radius
   return points.front().norm() - points.back().norm() <= distance;
 }
 
-ModelSymmetries of_ball(const Eigen::Vector3d& centre) {
-  ModelSymmetries symmetries;
-  for (int k = 0; k < 3; ++k) symmetries.continuous.push_back({Eigen::Vector3d::Unit(k), centre});
-  return symmetries;
+// Those of the candidates that keep the surface. Of candidates a few degrees apart, which a shape of many sides keeps
+// within the tolerance, the exact one counts.
+std::vector<Eigen::Matrix3d> distinct_symmetries(const Surface& surface, const std::vector<Eigen::Matrix3d>& candidates,
+                                                 double distance) {
+  std::vector<Eigen::Matrix3d> found;
+  const auto is_known = [&](const Eigen::Matrix3d& R) {
+    if ((R - Eigen::Matrix3d::Identity()).norm() < kSameRotation) return true;
+    return std::any_of(found.begin(), found.end(),
+                       [&](const Eigen::Matrix3d& other) { return (other - R).norm() < kSameRotation; });
+  };
+  for (const double strictness : {0.01, 0.1, 0.3, 1.0}) {
+    for (const Eigen::Matrix3d& R : candidates) {
+      if (!is_known(R) && surface.keeps(R, strictness * distance)) found.push_back(tidy(R));
+    }
+  }
+  return found;
+}
+
+// The symmetries about the origin.
+ShapeSymmetry symmetry_about_origin(const TriangleMesh& centred, const SurfaceMoments& moments, double tolerance) {
+  ShapeSymmetry symmetry;
+  const double distance = tolerance * diameter(centred);
+  const Surface surface(centred);
+  symmetry.ball = is_ball(surface, distance);
+  if (symmetry.ball) return symmetry;
+  const Axes axes = candidate_axes(centred, moments.covariance);
+  for (const Eigen::Vector3d& axis : axes.all) {
+    if (!is_round_about(surface, axis, distance)) continue;
+    symmetry.axis = axis;
+    const Eigen::Matrix3d swap_ends = turn(M_PI, axis.unitOrthogonal());
+    if (surface.keeps(swap_ends, distance)) symmetry.rotations.push_back(tidy(swap_ends));
+    return symmetry;
+  }
+  symmetry.rotations = distinct_symmetries(surface, discrete_candidates(centred, axes, tolerance), distance);
+  return symmetry;
 }
 
 }  // namespace
 
-ModelSymmetries model_symmetries(const TriangleMesh& mesh, const ModelSymmetryOptions& options) {
+ShapeSymmetry symmetry_of(const TriangleMesh& mesh, double tolerance) {
   const SurfaceMoments moments = surface_moments(mesh);
-  TriangleMesh centred = weld(translated(mesh, -moments.centre));
-  // Rounding in the centre must not show in the file as an offset of 1e-18.
-  const double size = (bounding_box(centred).max - bounding_box(centred).min).norm();
-  const Eigen::Vector3d centre =
-      moments.centre.unaryExpr([&](double x) { return std::abs(x) < 1e-9 * size ? 0.0 : x; });
-  const double distance = options.tolerance * diameter(centred);
-  const Surface surface(centred);
-  if (is_ball(surface, distance)) return of_ball(centre);
+  ShapeSymmetry symmetry = symmetry_about_origin(weld(translated(mesh, -moments.centre)), moments, tolerance);
+  // Rounding must not show in a file as an offset of 1e-18.
+  const BoundingBox box = bounding_box(mesh);
+  const double rounding = 1e-9 * (box.max - box.min).norm();
+  symmetry.centre = moments.centre.unaryExpr([&](double x) { return std::abs(x) < rounding ? 0.0 : x; });
+  return symmetry;
+}
 
-  ModelSymmetries symmetries;
-  const Axes axes = candidate_axes(centred, moments.covariance);
-  for (const Eigen::Vector3d& axis : axes.all) {
-    if (!is_round_about(surface, axis, distance)) continue;
-    symmetries.continuous.push_back({axis, centre});
-    const Eigen::Matrix3d swap_ends = turn(M_PI, axis.unitOrthogonal());
-    if (surface.keeps(swap_ends, distance)) symmetries.discrete.push_back(about_centre(swap_ends, centre));
-    return symmetries;
+ShapeSymmetry symmetry_of(const Object& object, double tolerance) {
+  ShapeSymmetry symmetry;
+  if (object.kind == SolidKind::kSphere) {
+    symmetry.ball = true;
+  } else if (object.kind == SolidKind::kCylinder) {
+    symmetry.axis = Eigen::Vector3d::UnitZ();
+    symmetry.rotations = {Eigen::Vector3d(1, -1, -1).asDiagonal()};
+  } else {
+    symmetry = symmetry_about_origin(weld(object.mesh), surface_moments(object.mesh), tolerance);
   }
-  std::vector<Eigen::Matrix3d> found = {Eigen::Matrix3d::Identity()};
-  for (const Eigen::Matrix3d& R : discrete_candidates(centred, axes, options.tolerance)) {
-    const bool known = std::any_of(found.begin(), found.end(),
-                                   [&](const Eigen::Matrix3d& other) { return (other - R).norm() < kSameRotation; });
-    if (known || !surface.keeps(R, distance)) continue;
-    found.push_back(R);
-    symmetries.discrete.push_back(about_centre(R, centre));
-  }
-  return symmetries;
+  return symmetry;
 }
 
 }  // namespace dofusion
