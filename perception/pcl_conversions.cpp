@@ -133,7 +133,7 @@ void write_cloud(const Cloud& cloud, const std::string& path) {
   pcl::toPCLPointCloud2(cloud, blob);
   std::ostringstream bytes;
   pcl::PCDWriter writer;
-  if (writer.writeBinary(bytes, blob) != 0) throw InputError(path + ": PCL cannot write these points");
+  if (writer.writeBinaryCompressed(bytes, blob) != 0) throw InputError(path + ": PCL cannot write these points");
   write_file(path, bytes.str());
 }
 

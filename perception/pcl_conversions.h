@@ -21,7 +21,7 @@ using Cloud = pcl::PointCloud<pcl::PointXYZ>;  // camera frame (x right, y down,
 // A PCD or PLY file. Throws InputError naming the file if it cannot be read or has no points.
 Cloud read_cloud(const std::string& path);
 
-// A binary PCD file, organised if the cloud is. Throws InputError naming the file if it cannot be written.
+// A PCD file (binary_compressed), organised if the cloud is. Throws InputError naming the file if it cannot be written.
 void write_cloud(const Cloud& cloud, const std::string& path);
 
 // An organised cloud, one point a pixel; NaN where there is no reading.
