@@ -29,6 +29,7 @@ int main(int argc, char** argv) {
       "the same command goes on where it was.\n\nExamples:\n"
       "  dofusion-scan --task unstructured --objects 3 --count 100 --out scans\n"
       "  dofusion-scan --data scenes.h5 --data-split test --cameras 5 --sensor kinect --out scans\n"
+      "  dofusion-scan --mjcf kitchen.xml --settle --camera all --out kitchen\n"
       "  dofusion-scan --count 20 --sensor none --pcd --fine-rgb --out exact",
       "dofusion-scan"};
   ScanJob job;
@@ -37,14 +38,32 @@ int main(int argc, char** argv) {
   std::vector<int> size{job.camera.width, job.camera.height};
   auto* data = app.add_option("--data", job.data, "scenes of this dataset (HDF5, of dofusion-generate)");
   app.add_option("--data-split", job.data_split, "only the dataset's scenes of train, validation or test")->needs(data);
-  app.add_option("--task", task, "or new scenes: single, unstructured or stack")->capture_default_str()->excludes(data);
+  auto* mjcf =
+      app.add_option("--mjcf", job.mjcf.file, "or this MuJoCo scene: what moves in it are the objects")->excludes(data);
+  app.add_option("--keyframe", job.mjcf.keyframe, "name or number of the MuJoCo file's keyframe to start from")
+      ->needs(mjcf);
+  app.add_flag("--settle", job.mjcf.settle, "let the MuJoCo scene come to rest first")->needs(mjcf);
+  auto* camera =
+      app.add_option("--camera", job.mjcf.camera, "look from this camera of the MuJoCo file, or from all")->needs(mjcf);
+  app.add_option("--task", task, "or new scenes: single, unstructured or stack")
+      ->capture_default_str()
+      ->excludes(data)
+      ->excludes(mjcf);
   app.add_option("--objects", job.generation.objects, "objects in a new scene, 1 to 6 (1 for single)")
       ->capture_default_str()
-      ->excludes(data);
-  app.add_option("--shapes", shapes, "of new scenes: blocks or general")->capture_default_str()->excludes(data);
+      ->excludes(data)
+      ->excludes(mjcf);
+  app.add_option("--shapes", shapes, "of new scenes: blocks or general")
+      ->capture_default_str()
+      ->excludes(data)
+      ->excludes(mjcf);
   app.add_option("--count", job.count, "scenes; 0: all of the dataset, or 10 new ones")
-      ->check(CLI::Range(0, 1'000'000));
-  app.add_option("--cameras", job.cameras, "viewpoints a scene")->check(CLI::Range(1, 10'000))->capture_default_str();
+      ->check(CLI::Range(0, 1'000'000))
+      ->excludes(mjcf);
+  app.add_option("--cameras", job.cameras, "viewpoints a scene")
+      ->check(CLI::Range(1, 10'000))
+      ->capture_default_str()
+      ->excludes(camera);
   app.add_option("--sensor", sensor, "none, kinect, kinect2, realsense or azure")->capture_default_str();
   app.add_option("--noise-scale", job.view.noise_scale, "multiplies the sensor's noise")
       ->check(CLI::Range(0.0, 100.0))

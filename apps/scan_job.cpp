@@ -26,9 +26,11 @@ using nlohmann::ordered_json;
 constexpr std::uint64_t kViewSeed = 0x5CA4;  // keeps the draws of viewpoints and noise apart from the scenes'
 constexpr char kJournal[] = "scenes.journal";
 
+bool is_new(const ScanJob& job) { return job.data.empty() && job.mjcf.file.empty(); }
+
 ordered_json settings_of(const ScanJob& job, const GenerationOptions& generation, std::int64_t count) {
   ordered_json settings{{"format", "dofusion-scan"}, {"version", 1}};
-  if (job.data.empty()) settings["generation"] = ordered_json::parse(to_json(generation));
+  if (is_new(job)) settings["generation"] = ordered_json::parse(to_json(generation));
   settings.update(ordered_json{{"count", count},
                                {"cameras", job.cameras},
                                {"sensor", to_string(job.view.sensor)},
@@ -75,13 +77,14 @@ class Scans {
  public:
   Scans(const ScanJob& job, const ScanScenes& scenes, const ScanFolder& folder)
       : job_(job), scenes_(scenes), folder_(folder), hands_(static_cast<std::size_t>(job.threads)) {
+    cameras_ = scenes.views.empty() ? job.cameras : static_cast<int>(scenes.views.size());
     for (std::size_t k = 0; k < scenes.scenes.size(); ++k) {
       missing_.push_back(std::make_unique<std::atomic<int>>(0));
       find_missing(static_cast<std::int64_t>(k));
     }
   }
 
-  std::int64_t images() const { return static_cast<std::int64_t>(scenes_.scenes.size()) * job_.cameras; }
+  std::int64_t images() const { return static_cast<std::int64_t>(scenes_.scenes.size()) * cameras_; }
   std::int64_t left() const { return static_cast<std::int64_t>(left_.size()); }
 
   void make(const std::function<void()>& image_done) {
@@ -109,7 +112,7 @@ class Scans {
     std::error_code error;
     if (fs::exists(folders.finished, error)) return;
     int missing = 0;
-    for (int image = 0; image < job_.cameras; ++image) {
+    for (int image = 0; image < cameras_; ++image) {
       if (has_bop_image(folders.work, image)) continue;
       left_.push_back({scene, image});
       ++missing;
@@ -118,33 +121,54 @@ class Scans {
     if (missing == 0) finish(scene);  // killed between its last image and its end
   }
 
+  void take_up(std::int64_t number, SceneAtHand& hand) const {
+    const auto k = static_cast<std::size_t>(number);
+    const Scene& scene = scenes_.scenes[k];
+    Scene everything = scene;
+    if (scenes_.surroundings) {
+      everything.objects.push_back(scenes_.surroundings);
+      everything.T_world_object.push_back(Pose::Identity());
+    }
+    ScannerOptions options;
+    options.table = scenes_.table;
+    hand.scanner = std::make_unique<Scanner>(everything.objects, options);
+    hand.scanner->set_poses(everything.T_world_object);
+    hand.writer =
+        std::make_unique<BopSceneWriter>(scene, scenes_.ids[k], folders_of(folder_, job_, number).work, job_.clouds);
+    hand.centre = scene_centre(scene);
+    hand.number = number;
+  }
+
+  ScanView view_of(int image, const SceneAtHand& hand, Rng& rng) const {
+    if (!scenes_.views.empty()) return scenes_.views[static_cast<std::size_t>(image)];
+    return {job_.camera, sample_viewpoint(hand.centre, job_.view.viewpoint, rng)};
+  }
+
   void scan(std::int64_t number, int image, SceneAtHand& hand) const {
     const auto k = static_cast<std::size_t>(number);
     const Scene& scene = scenes_.scenes[k];
-    if (hand.number != number) {
-      hand.scanner = std::make_unique<Scanner>(scene.objects);
-      hand.scanner->set_poses(scene.T_world_object);
-      hand.writer = std::make_unique<BopSceneWriter>(scene, scenes_.ids[k], job_.camera,
-                                                     folders_of(folder_, job_, number).work, job_.clouds);
-      hand.centre = scene_centre(scene);
-      hand.number = number;
-    }
-    Rng rng = make_rng(job_.seed ^ kViewSeed, static_cast<std::uint64_t>(number * job_.cameras + image));
-    const Pose T_world_camera = sample_viewpoint(hand.centre, job_.view.viewpoint, rng);
-    const std::string problem = viewpoint_problem(scene, T_world_camera);
+    if (hand.number != number) take_up(number, hand);
+    Rng rng = make_rng(job_.seed ^ kViewSeed, static_cast<std::uint64_t>(number * cameras_ + image));
+    const ScanView from = view_of(image, hand, rng);
+    const std::string problem = viewpoint_problem(scene, from.T_world_camera, scenes_.table);
     if (!problem.empty()) {
-      throw UnusableScene("image " + std::to_string(image) + ": " + problem + "; choose another --distance or --seed");
+      throw UnusableScene("image " + std::to_string(image) + ": " + problem +
+                          (scenes_.views.empty() ? "; choose another --distance or --seed" : ""));
     }
-    const SyntheticView view = make_synthetic_view(*hand.scanner, job_.camera, T_world_camera, job_.view, rng);
-    hand.writer->add(image, view,
-                     job_.fine_rgb ? shaded_picture(*hand.scanner, job_.camera, T_world_camera)
-                                   : quick_picture(view.truth, T_world_camera));
+    SyntheticView view = make_synthetic_view(*hand.scanner, from.camera, from.T_world_camera, job_.view, rng);
+    // What the scanner has after the scene's objects is the surroundings: for the dataset, as the table.
+    for (std::uint8_t& label : view.truth.labels.pixels) {
+      if (label >= kLabelFirstObject + scene.objects.size()) label = kLabelTable;
+    }
+    hand.writer->add(image, from.camera, view,
+                     job_.fine_rgb ? shaded_picture(*hand.scanner, from.camera, from.T_world_camera)
+                                   : quick_picture(view.truth, from.T_world_camera));
   }
 
   void finish(std::int64_t scene) const {
     const SceneFolders folders = folders_of(folder_, job_, scene);
     try {
-      finish_bop_scene(folders.work, job_.cameras, scenes_.scenes[static_cast<std::size_t>(scene)]);
+      finish_bop_scene(folders.work, cameras_, scenes_.scenes[static_cast<std::size_t>(scene)]);
     } catch (const UnusableScene& e) {
       throw of_scene(scene, e);
     }
@@ -160,6 +184,7 @@ class Scans {
   const ScanJob& job_;
   const ScanScenes& scenes_;
   const ScanFolder& folder_;
+  int cameras_ = 0;                                         // images a scene
   std::vector<SceneAtHand> hands_;                          // per thread
   std::vector<std::unique_ptr<std::atomic<int>>> missing_;  // images, per scene
   std::vector<Item> left_;
@@ -175,7 +200,8 @@ double processor_seconds() {
 void write_models(const ScanScenes& scenes, const ScanJob& job, const ScanFolder& folder) {
   std::error_code error;
   if (fs::exists(folder.path() / "models" / "models_info.json", error)) return;
-  write_bop_models(scenes.models, job.camera, folder.path(), job.threads);
+  write_bop_models(scenes.models, scenes.views.empty() ? job.camera : scenes.views.front().camera, folder.path(),
+                   job.threads);
 }
 
 ScanResult scan_all(const ScanJob& job, const ScanScenes& scenes, const ScanFolder& folder) {
@@ -210,14 +236,14 @@ ScanResult scan_scenes(const ScanJob& job) {
   const std::int64_t fresh = job.count > 0 ? job.count : 10;
   ScanScenes scenes;
   ordered_json settings = settings_of(job, generation, fresh);
-  if (!job.data.empty()) {
-    scenes = scan_scenes_of(read_scenes(job));
+  if (!is_new(job)) {
+    scenes = job.data.empty() ? scan_scenes_of_mjcf(job.mjcf, job.camera) : scan_scenes_of(read_scenes(job));
     settings["count"] = scenes.scenes.size();
     settings["scenes"] = fingerprint(scenes);
   }
   ScanFolder folder(job.out, settings);
   try {
-    if (job.data.empty()) {
+    if (is_new(job)) {
       scenes = scan_scenes_of(generate_scenes(generation, fresh, job.threads, folder.path() / kJournal));
     }
     const ScanResult result = scan_all(job, scenes, folder);

@@ -6,6 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "apps/scan_mjcf.h"
 #include "perception/camera.h"
 #include "perception/synthetic_view.h"
 #include "stability/generation.h"
@@ -14,9 +15,10 @@ namespace dofusion {
 
 struct ScanJob {
   std::string data, data_split;  // scenes of this dataset, all or those of one split …
-  GenerationOptions generation;  // … or, if `data` is empty, new ones; its seed is not used but `seed`
+  MjcfScanOptions mjcf;          // … or, if its `file` is set, that scene …
+  GenerationOptions generation;  // … or, if both are empty, new ones; its seed is not used but `seed`
   std::int64_t count = 0;        // scenes; 0: all of the dataset, or 10 new ones
-  int cameras = 1;               // viewpoints a scene
+  int cameras = 1;               // viewpoints a scene, unless the MJCF file's are used
   Camera camera = default_camera();
   SyntheticViewOptions view;
   bool fine_rgb = false;  // colour pictures with soft shadows

@@ -73,15 +73,18 @@ SceneDataset generate_scenes(const GenerationOptions& options, std::int64_t coun
   return dataset;
 }
 
+void check_number_of_objects(std::size_t objects, const std::string& scene) {
+  if (objects <= kMostObjects) return;
+  throw UnusableScene(scene + ": has " + std::to_string(objects) + " objects; a scan can hold " +
+                      std::to_string(kMostObjects));
+}
+
 ScanScenes scan_scenes_of(const SceneDataset& dataset) {
   ScanScenes result;
   std::map<std::array<double, 4>, int> id_of;  // by shape and scale
   for (std::size_t k = 0; k < dataset.scenes.size(); ++k) {
     const SceneRecord& record = dataset.scenes[k];
-    if (record.objects.size() > kMostObjects) {
-      throw UnusableScene("scene " + std::to_string(k) + ": has " + std::to_string(record.objects.size()) +
-                          " objects; a scan can hold " + std::to_string(kMostObjects));
-    }
+    check_number_of_objects(record.objects.size(), "scene " + std::to_string(k));
     Scene scene = to_scene(dataset, record);
     std::vector<int> ids;
     for (std::size_t i = 0; i < record.objects.size(); ++i) {
@@ -101,14 +104,20 @@ ScanScenes scan_scenes_of(const SceneDataset& dataset) {
 
 std::string fingerprint(const ScanScenes& scenes) {
   Fnv1a hash;
-  for (const ObjectPtr& model : scenes.models) {
-    hash.add(model->name.data(), model->name.size());
-    for (const Eigen::Vector3d& v : model->mesh.vertices) hash.add(v.data(), sizeof(double) * 3);
-    for (const Eigen::Vector3i& t : model->mesh.triangles) hash.add(t.data(), sizeof(int) * 3);
-  }
+  const auto add_shape = [&](const Object& shape) {
+    hash.add(shape.name.data(), shape.name.size());
+    for (const Eigen::Vector3d& v : shape.mesh.vertices) hash.add(v.data(), sizeof(double) * 3);
+    for (const Eigen::Vector3i& t : shape.mesh.triangles) hash.add(t.data(), sizeof(int) * 3);
+  };
+  for (const ObjectPtr& model : scenes.models) add_shape(*model);
+  if (scenes.surroundings) add_shape(*scenes.surroundings);
   for (std::size_t k = 0; k < scenes.scenes.size(); ++k) {
     hash.add(scenes.ids[k].data(), sizeof(int) * scenes.ids[k].size());
     for (const Pose& pose : scenes.scenes[k].T_world_object) hash.add(pose.matrix().data(), sizeof(double) * 16);
+  }
+  for (const ScanView& view : scenes.views) {
+    hash.add(&view.camera.fy, sizeof(double));
+    hash.add(view.T_world_camera.matrix().data(), sizeof(double) * 16);
   }
   return hash.hex();
 }

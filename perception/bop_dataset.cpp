@@ -79,7 +79,8 @@ PixelBox projected_box(const Object& object, const Pose& T_camera_object, const 
 std::vector<LabelImage> visible_parts(const LabelImage& labels, std::size_t objects) {
   std::vector<LabelImage> parts(objects, LabelImage(labels.width, labels.height));
   for (std::size_t p = 0; p < labels.pixels.size(); ++p) {
-    if (labels.pixels[p] >= kLabelFirstObject) parts[labels.pixels[p] - kLabelFirstObject].pixels[p] = kMasked;
+    const std::size_t object = labels.pixels[p] - std::size_t{kLabelFirstObject};
+    if (object < objects) parts[object].pixels[p] = kMasked;
   }
   return parts;
 }
@@ -97,7 +98,6 @@ std::string bop_scene_name(int scene) { return number_name(scene); }
 struct BopSceneWriter::Impl {
   Scene scene;
   std::vector<int> model_ids;
-  Camera camera;
   fs::path folder;
   bool clouds = false;
   std::vector<Scanner> alone;  // per object, without anything that could hide it
@@ -105,18 +105,18 @@ struct BopSceneWriter::Impl {
   std::string file(const char* kind, const std::string& name) const {
     return (folder / kind / (name + ".png")).string();
   }
-  Json write_masks(int object, const SyntheticView& view, const LabelImage& visible, const std::string& image);
+  Json write_masks(int object, const Camera& camera, const SyntheticView& view, const LabelImage& visible,
+                   const std::string& image);
 };
 
-BopSceneWriter::BopSceneWriter(const Scene& scene, const std::vector<int>& model_ids, const Camera& camera,
-                               const fs::path& folder, bool clouds)
+BopSceneWriter::BopSceneWriter(const Scene& scene, const std::vector<int>& model_ids, const fs::path& folder,
+                               bool clouds)
     : impl_(std::make_unique<Impl>()) {
   if (model_ids.size() != scene.objects.size())
     throw std::invalid_argument(std::to_string(model_ids.size()) + " model ids for " +
                                 std::to_string(scene.objects.size()) + " objects");
   impl_->scene = scene;
   impl_->model_ids = model_ids;
-  impl_->camera = camera;
   impl_->folder = folder;
   impl_->clouds = clouds;
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
@@ -129,14 +129,13 @@ BopSceneWriter::BopSceneWriter(const Scene& scene, const std::vector<int>& model
 
 BopSceneWriter::~BopSceneWriter() = default;
 
-void BopSceneWriter::add(int image, const SyntheticView& view, const ColourImage& rgb) {
+void BopSceneWriter::add(int image, const Camera& c, const SyntheticView& view, const ColourImage& rgb) {
   Impl& impl = *impl_;
   const std::string name = number_name(image);
-  write_depth(view.depth, impl.camera, impl.file("depth", name));
+  write_depth(view.depth, c, impl.file("depth", name));
   write_picture(rgb, impl.file("rgb", name));
-  if (impl.clouds) write_cloud(to_cloud(view.depth, impl.camera), (impl.folder / "pcd" / (name + ".pcd")).string());
+  if (impl.clouds) write_cloud(to_cloud(view.depth, c), (impl.folder / "pcd" / (name + ".pcd")).string());
 
-  const Camera& c = impl.camera;
   const Pose T_camera_world = view.T_world_camera.inverse();
   Json record;
   record["camera"] = {{"cam_K", {c.fx, 0.0, c.cx, 0.0, c.fy, c.cy, 0.0, 0.0, 1.0}},
@@ -152,14 +151,14 @@ void BopSceneWriter::add(int image, const SyntheticView& view, const ColourImage
     record["truth"].push_back({{"cam_R_m2c", rotation_json(T_camera_object)},
                                {"cam_t_m2c", translation_mm_json(T_camera_object)},
                                {"obj_id", impl.model_ids[i]}});
-    record["info"].push_back(impl.write_masks(static_cast<int>(i), view, visible[i], name));
+    record["info"].push_back(impl.write_masks(static_cast<int>(i), c, view, visible[i], name));
   }
   write_file(impl.folder / kRecords / (name + ".json"), record.dump());
 }
 
 // As in BOP, silhouette and its box and count go on beyond the image (up to one image), masks end with it.
-Json BopSceneWriter::Impl::write_masks(int object, const SyntheticView& view, const LabelImage& visible,
-                                       const std::string& image) {
+Json BopSceneWriter::Impl::write_masks(int object, const Camera& camera, const SyntheticView& view,
+                                       const LabelImage& visible, const std::string& image) {
   const auto i = static_cast<std::size_t>(object);
   const Pose T_camera_object = view.T_world_camera.inverse() * scene.T_world_object[i];
   const PixelBox window = projected_box(*scene.objects[i], T_camera_object, camera);

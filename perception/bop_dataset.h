@@ -44,12 +44,12 @@ class BopSceneWriter {
  public:
   // `model_ids` are the objects' ids in the dataset, from 1. Makes the scene's folders, with those of clouds if
   // `clouds`. Throws std::invalid_argument if the number of ids is wrong.
-  BopSceneWriter(const Scene& scene, const std::vector<int>& model_ids, const Camera& camera,
-                 const std::filesystem::path& folder, bool clouds = false);
+  BopSceneWriter(const Scene& scene, const std::vector<int>& model_ids, const std::filesystem::path& folder,
+                 bool clouds = false);
   ~BopSceneWriter();
 
   // Writes the files of image number `image`, and last of all its record, a file that finish_bop_scene uses.
-  void add(int image, const SyntheticView& view, const ColourImage& rgb);
+  void add(int image, const Camera& camera, const SyntheticView& view, const ColourImage& rgb);
 
  private:
   struct Impl;

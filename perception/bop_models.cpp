@@ -95,7 +95,8 @@ Json model_info(const Object& object) {
             {"size_x", size.x()},
             {"size_y", size.y()},
             {"size_z", size.z()}};
-  json.update(symmetries_json(symmetry_of(object)));
+  // A mesh need not have its origin at the centre of mass.
+  json.update(symmetries_json(object.kind == SolidKind::kMesh ? symmetry_of(object.mesh) : symmetry_of(object)));
   json["name"] = object.name;
   return json;
 }

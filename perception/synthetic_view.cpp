@@ -69,9 +69,9 @@ SyntheticView make_synthetic_view(const Scanner& scanner, const Camera& camera, 
   return view;
 }
 
-std::string viewpoint_problem(const Scene& scene, const Pose& T_world_camera) {
+std::string viewpoint_problem(const Scene& scene, const Pose& T_world_camera, bool table) {
   const Eigen::Vector3d eye = T_world_camera.translation();
-  if (!(eye.z() > 0.0)) return "the camera is under the table";
+  if (table && !(eye.z() > 0.0)) return "the camera is under the table";
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
     if (is_inside(scene.objects[i]->mesh, scene.T_world_object[i].inverse() * eye))
       return "the camera is inside object " + std::to_string(i) + " (" + scene.objects[i]->name + ")";

@@ -48,8 +48,8 @@ SyntheticView make_synthetic_view(const Scene& scene, const Camera& camera, cons
 SyntheticView make_synthetic_view(const Scanner& scanner, const Camera& camera, const Pose& T_world_camera,
                                   const SyntheticViewOptions& options, Rng& rng);
 
-// Why a camera at this place shows nothing of use: it is under the table, or inside an object (by the winding number
-// of its mesh). Empty: it does.
-std::string viewpoint_problem(const Scene& scene, const Pose& T_world_camera);
+// Why a camera at this place shows nothing of use: it is under the table (where there is one), or inside an object (by
+// the winding number of its mesh). Empty: it does.
+std::string viewpoint_problem(const Scene& scene, const Pose& T_world_camera, bool table = true);
 
 }  // namespace dofusion

@@ -3,10 +3,13 @@
 // what every file and key means.
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iomanip>
 #include <limits>
+#include <map>
 #include <set>
 #include <sstream>
 
@@ -101,6 +104,49 @@ Model read_ply(const fs::path& file) {
   }
   EXPECT_FALSE(stream.fail()) << file;
   return model;
+}
+
+// Undoes LZF: runs of literal bytes, and copies of what came before.
+std::string lzf_decoded(const std::string& data) {
+  std::string out;
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(data.at(i)); };
+  for (std::size_t i = 0; i < data.size();) {
+    const std::size_t control = byte(i++);
+    if (control < 32) {
+      out.append(data, i, control + 1);
+      i += control + 1;
+      continue;
+    }
+    std::size_t length = control >> 5;
+    if (length == 7) length += byte(i++);
+    const std::size_t from = out.size() - ((control & 31) << 8) - byte(i++) - 1;
+    for (std::size_t k = 0; k < length + 2; ++k) out.push_back(out.at(from + k));
+  }
+  return out;
+}
+
+// An organised PCD file, binary_compressed: all x, then all y, then all z, packed by LZF.
+std::vector<float> read_pcd(const fs::path& file, int width, int height) {
+  std::ifstream stream(file, std::ios::binary);
+  std::string line, header;
+  while (std::getline(stream, line)) {
+    header += line + "\n";
+    if (line.rfind("DATA", 0) == 0) break;
+  }
+  EXPECT_EQ(line, "DATA binary_compressed");
+  EXPECT_NE(header.find("FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\n"), std::string::npos) << header;
+  EXPECT_NE(header.find("WIDTH " + std::to_string(width) + "\nHEIGHT " + std::to_string(height)), std::string::npos)
+      << header;
+  std::array<std::uint32_t, 2> sizes{};  // packed and not
+  stream.read(reinterpret_cast<char*>(sizes.data()), sizeof sizes);
+  std::string packed(sizes[0], '\0');
+  stream.read(packed.data(), static_cast<std::streamsize>(packed.size()));
+  EXPECT_FALSE(stream.fail()) << file;
+  const std::string bytes = lzf_decoded(packed);
+  EXPECT_EQ(bytes.size(), sizes[1]);
+  std::vector<float> values(bytes.size() / sizeof(float));
+  std::memcpy(values.data(), bytes.data(), values.size() * sizeof(float));
+  return values;
 }
 
 // Distance from a point to a triangle's plane where the point projects into it, else to its edges.
@@ -422,36 +468,24 @@ class Dataset {
 
   // Organised points as floats in metres in the camera's frame, NaN where the depth image has no reading.
   void check_cloud(const fs::path& file, const cv::Mat& depth) const {
-    std::ifstream stream(file, std::ios::binary);
-    std::string line, header;
-    while (std::getline(stream, line)) {
-      header += line + "\n";
-      if (line.rfind("DATA", 0) == 0) break;
-    }
-    EXPECT_NE(header.find("FIELDS x y z"), std::string::npos) << header;
-    EXPECT_NE(header.find("WIDTH " + std::to_string(view_.width) + "\nHEIGHT " + std::to_string(view_.height)),
-              std::string::npos)
-        << header;
-    ASSERT_EQ(line, "DATA binary");
+    const std::vector<float> values = read_pcd(file, view_.width, view_.height);
+    const std::size_t points = depth.total();
+    ASSERT_EQ(values.size(), 3 * points);
     const double scale = camera_["depth_scale"].get<double>() / 1000.0;
     const Eigen::Matrix3d K_inverse = view_.K.inverse();
-    for (int v = 0; v < view_.height; ++v) {
-      for (int u = 0; u < view_.width; ++u) {
-        std::array<float, 3> p{};
-        stream.read(reinterpret_cast<char*>(p.data()), sizeof p);
-        const int value = depth.at<std::uint16_t>(v, u);
-        if (value == 0) {
-          ASSERT_TRUE(std::isnan(p[0]) && std::isnan(p[1]) && std::isnan(p[2]));
-          continue;
-        }
-        const Eigen::Vector3d wanted = value * scale * (K_inverse * Eigen::Vector3d(u, v, 1.0));
-        // The file has the view's depth before it was rounded to steps of the image.
-        ASSERT_NEAR(p[2], wanted.z(), 0.51 * scale);
-        ASSERT_NEAR(p[0] / p[2], wanted.x() / wanted.z(), 1e-5);
-        ASSERT_NEAR(p[1] / p[2], wanted.y() / wanted.z(), 1e-5);
+    for (std::size_t i = 0; i < points; ++i) {
+      const int u = static_cast<int>(i) % view_.width, v = static_cast<int>(i) / view_.width;
+      const float x = values[i], y = values[points + i], z = values[2 * points + i];
+      if (depth.at<std::uint16_t>(v, u) == 0) {
+        ASSERT_TRUE(std::isnan(x) && std::isnan(y) && std::isnan(z));
+        continue;
       }
+      const Eigen::Vector3d ray = K_inverse * Eigen::Vector3d(u, v, 1.0);
+      // The file has the view's depth before it was rounded to steps of the image.
+      ASSERT_NEAR(z, depth.at<std::uint16_t>(v, u) * scale, 0.51 * scale);
+      ASSERT_NEAR(x / z, ray.x(), 1e-5);
+      ASSERT_NEAR(y / z, ray.y(), 1e-5);
     }
-    EXPECT_EQ(stream.peek(), std::ifstream::traits_type::eof());
   }
 
   static constexpr long kEdgePixels = 3;  // an image
