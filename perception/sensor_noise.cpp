@@ -120,11 +120,13 @@ SensorTerms sensor_terms(SensorModel sensor) {
       break;
     case SensorModel::kKinect:
       terms = published_kinect_terms();
-      terms.axial_sigma = kinect_sigma;
+      terms.axial_sigma = khoshelham_sigma;
       terms.lateral_sigma_px = handa_lateral_sigma_px;
-      // Fitted to the real frames' scatter in windows of 5 to 21 pixels and its correlation (sensor_calibration).
-      terms.correlation_px = 2.2;
-      terms.warp_px = 0.1;
+      // Fitted to the real frames' scatter in windows of 5 to 21 pixels and to its correlation over 1 to 32 pixels
+      // (sensor_calibration).
+      terms.correlation_px = 1.6;
+      terms.warp_px = 0.12;
+      terms.warp_length_px = 40.0;
       return terms;
     case SensorModel::kKinect2:
       terms.axial_sigma = kinect2_axial_sigma;
@@ -175,28 +177,16 @@ DepthImage apply_sensor_noise(const Scan& scan, const Camera& camera, const Sens
   return noisy;
 }
 
-namespace {
-
-// Nguyen et al.'s addition beyond 60 degrees, metres.
-double grazing_sigma(double depth, double incidence) {
-  if (incidence <= kPi / 3) return 0.0;
-  const double from_grazing = kPi / 2 - incidence;
-  return 0.0001 * incidence * incidence / (std::sqrt(depth) * from_grazing * from_grazing);
-}
-
-}  // namespace
-
 double kinect_axial_sigma(double depth, double incidence) {
-  return 0.0012 + 0.0019 * (depth - 0.4) * (depth - 0.4) + grazing_sigma(depth, incidence);
+  const double frontal = 0.0012 + 0.0019 * (depth - 0.4) * (depth - 0.4);
+  if (incidence <= kPi / 3) return frontal;
+  const double from_grazing = kPi / 2 - incidence;
+  return frontal + 0.0001 * incidence * incidence / (std::sqrt(depth) * from_grazing * from_grazing);
 }
 
 double khoshelham_sigma(double depth, double) { return 1.425e-3 * depth * depth; }
 
 double khoshelham_depth_step(double depth) { return 2.85e-3 * depth * depth; }
-
-double kinect_sigma(double depth, double incidence) {
-  return khoshelham_sigma(depth, incidence) + grazing_sigma(depth, incidence);
-}
 
 double kinect2_axial_sigma(double depth, double incidence) {
   const double from_grazing = kPi / 2 - incidence;

@@ -43,10 +43,11 @@ struct SensorTerms {
 
 // A sensor as it is taken here. The Kinect's is calibrated: Khoshelham and Elberink's random error and Handa et al.'s
 // lateral shift, correlated over a few pixels, steps of 1/8 px, and a warp. On a table it scatters as the real frames
-// do (plane_noise.h); `sensor_calibration` prints both. The others are as published.
-// No sensor has holes or a miscalibration of its own, for which there is no source, and none uses incidence_drop: at
-// 1 it would take half of a table seen at 60 degrees, whereas 45 frames of a first Kinect (mOSD, tables seen at 40 to
-// 60 degrees) have no hole inside a table in 6.4 million pixels.
+// do (plane_noise.h); `sensor_calibration` prints both. Nguyen et al.'s increase of the axial noise beyond 60 degrees
+// is left out: the frames, which reach 65 degrees, do not show it. The others are as published. No sensor has holes or
+// a miscalibration of its own, for which there is no source, and none uses incidence_drop: at 1 it would take half of a
+// table seen at 60 degrees, whereas 45 frames of a first Kinect (mOSD, tables seen at 40 to 60 degrees) have no hole
+// inside a table in 6.4 million pixels.
 SensorTerms sensor_terms(SensorModel sensor);
 
 // The Kinect of Nguyen et al. with Handa et al.'s quantisation, every pixel for itself. On a table seen at 50 degrees
@@ -61,7 +62,6 @@ DepthImage apply_sensor_noise(const Scan& scan, const Camera& camera, const Sens
 // radians, below pi / 2.
 double kinect_axial_sigma(double depth, double incidence);   // Nguyen, Izadi and Lovell 2012, equations 2 and 3
 double khoshelham_sigma(double depth, double incidence);     // Khoshelham and Elberink 2012; of any incidence
-double kinect_sigma(double depth, double incidence);         // Khoshelham's, beyond 60 degrees with Nguyen's addition
 double kinect2_axial_sigma(double depth, double incidence);  // Fankhauser et al. 2015
 double realsense_sigma(double depth, double incidence);      // D435 at 848 x 480, Intel's depth tuning guide
 double azure_sigma(double depth, double incidence);          // BlenderProc's model
