@@ -17,6 +17,7 @@
 #include <sstream>
 #include <vector>
 
+#include "perception/pcl_conversions.h"
 #include "stability/files.h"
 
 namespace dofusion {
@@ -95,13 +96,15 @@ bool has_sane_ply_header(const std::string& path) {
   return false;
 }
 
-pcl::PointCloud<pcl::PointXYZ> read_cloud(const std::string& path) {
+}  // namespace
+
+Cloud read_cloud(const std::string& path) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) throw InputError(path + ": no such cloud file");
   std::string extension = std::filesystem::path(path).extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(), ::tolower);
   pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS);  // our own line says what is wrong
-  pcl::PointCloud<pcl::PointXYZ> cloud;
+  Cloud cloud;
   int status = -1;
   try {
     if (extension == ".pcd") {
@@ -119,8 +122,6 @@ pcl::PointCloud<pcl::PointXYZ> read_cloud(const std::string& path) {
   if (status < 0 || cloud.empty()) throw InputError(path + ": damaged, or without points");
   return cloud;
 }
-
-}  // namespace
 
 DepthImage read_cloud_as_depth(const std::string& path, const Camera& camera) {
   DepthImage depth(camera.width, camera.height, 0.0F);

@@ -2,18 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <limits>
 
 #include <Eigen/Dense>
-#include <pcl/io/pcd_io.h>
-#include <pcl/io/ply_io.h>
 #include <pcl/sample_consensus/ransac.h>
 #include <pcl/sample_consensus/sac_model_plane.h>
 #include <pcl/search/kdtree.h>
 #include <pcl/segmentation/extract_clusters.h>
-
-#include "stability/files.h"
 
 namespace dofusion {
 namespace {
@@ -113,18 +108,6 @@ std::optional<Table> cloud_table(const Cloud::ConstPtr& points, double band) {
 }
 
 }  // namespace
-
-Cloud read_cloud(const std::string& path) {
-  Cloud cloud;
-  const std::string extension = std::filesystem::path(path).extension().string();
-  const bool pcd = extension == ".pcd", ply = extension == ".ply";
-  if (!pcd && !ply) throw InputError(path + ": not a .pcd or .ply file");
-  if (!std::filesystem::is_regular_file(path)) throw InputError(path + ": no such file");
-  const int status = pcd ? pcl::io::loadPCDFile(path, cloud) : pcl::io::loadPLYFile(path, cloud);
-  if (status < 0) throw InputError(path + ": cannot be read as a point cloud");
-  if (cloud.empty()) throw InputError(path + ": has no points");
-  return cloud;
-}
 
 Cloud to_cloud(const DepthImage& depth, const Camera& camera) {
   check_image_size(depth.width, depth.height, camera);

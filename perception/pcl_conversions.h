@@ -18,7 +18,8 @@ namespace dofusion {
 
 using Cloud = pcl::PointCloud<pcl::PointXYZ>;  // camera frame (x right, y down, z forward), metres
 
-// A PCD or PLY file. Throws InputError naming the file if it cannot be read or has no points.
+// A PCD or PLY file (cloud_io.cpp, which looks at the header before PCL trusts it). Throws InputError naming the file if
+// it is missing, neither .pcd nor .ply, damaged, or without points.
 Cloud read_cloud(const std::string& path);
 
 // An organised cloud, one point a pixel; NaN where there is no reading.
