@@ -1,10 +1,5 @@
 #include "perception/cloud_io.h"
 
-#include <pcl/console/print.h>
-#include <pcl/io/pcd_io.h>
-#include <pcl/io/ply_io.h>
-#include <pcl/point_types.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -17,6 +12,11 @@
 #include <sstream>
 #include <vector>
 
+#include <pcl/console/print.h>
+#include <pcl/io/pcd_io.h>
+#include <pcl/io/ply_io.h>
+#include <pcl/point_types.h>
+
 #include "perception/pcl_conversions.h"
 #include "stability/files.h"
 
@@ -27,19 +27,23 @@ using Words = std::vector<std::string>;
 
 // A number of digits alone; none if it is something else or beyond 1e15.
 std::optional<std::uint64_t> whole_number(const std::string& word) {
-  if (word.empty() || word.size() > 15 || word.find_first_not_of("0123456789") != std::string::npos) return std::nullopt;
+  if (word.empty() || word.size() > 15 || word.find_first_not_of("0123456789") != std::string::npos)
+    return std::nullopt;
   return std::stoull(word);
 }
 
 // Bytes of one point; none if the lines on its fields do not fit one another.
-std::optional<std::uint64_t> point_bytes(const Words& fields, const Words& sizes, const Words& types, const Words& counts) {
-  if (fields.empty() || fields.size() > 100 || sizes.size() != fields.size() || types.size() != fields.size()) return std::nullopt;
+std::optional<std::uint64_t> point_bytes(const Words& fields, const Words& sizes, const Words& types,
+                                         const Words& counts) {
+  if (fields.empty() || fields.size() > 100 || sizes.size() != fields.size() || types.size() != fields.size())
+    return std::nullopt;
   if (!counts.empty() && counts.size() != fields.size()) return std::nullopt;
   std::uint64_t bytes = 0;
   for (std::size_t i = 0; i < fields.size(); ++i) {
     const auto size = whole_number(sizes[i]), count = counts.empty() ? 1 : whole_number(counts[i]);
     const bool known = types[i] == "F" ? size == 4 || size == 8 : types[i] == "I" || types[i] == "U";
-    if (!known || !(size == 1 || size == 2 || size == 4 || size == 8) || !count || *count < 1 || *count > 100000) return std::nullopt;
+    if (!known || !(size == 1 || size == 2 || size == 4 || size == 8) || !count || *count < 1 || *count > 100000)
+      return std::nullopt;
     bytes += *size * *count;
   }
   return bytes;
@@ -69,7 +73,9 @@ bool has_sane_pcd_header(const std::string& path) {
   }
   const auto width = whole_number(header["WIDTH"][0]), height = whole_number(header["HEIGHT"][0]);
   const auto points = whole_number(header["POINTS"][0]);
-  if (!bytes || !width || !height || !points || *width > 1000000000 || *height > 1000000 || *width * *height != *points) return false;
+  if (!bytes || !width || !height || !points || *width > 1000000000 || *height > 1000000 ||
+      *width * *height != *points || *points == 0)
+    return false;
   const std::uint64_t file_bytes = std::filesystem::file_size(path);
   const std::string& data = header["DATA"][0];
   if (data == "ascii") return 2 * *points <= file_bytes;  // a digit and the end of the line
@@ -80,18 +86,22 @@ bool has_sane_pcd_header(const std::string& path) {
   return in && unpacked == *points * *bytes && packed <= file_bytes;
 }
 
-// As above for a PLY: every element takes a byte at least.
+// As above for a PLY: every element takes a byte at least, and there are vertices.
 bool has_sane_ply_header(const std::string& path) {
   constexpr int kMostLines = 1000;
   const std::uint64_t file_bytes = std::filesystem::file_size(path);
   std::ifstream in(path, std::ios::binary);
   std::string line;
+  bool any = false;
   for (int k = 0; k < kMostLines && std::getline(in, line); ++k) {
     std::istringstream words(line);
     std::string keyword, name, count;
     words >> keyword >> name >> count;
-    if (keyword == "end_header") return true;
-    if (keyword == "element" && whole_number(count).value_or(file_bytes + 1) > file_bytes) return false;
+    if (keyword == "end_header") return any;
+    if (keyword != "element") continue;
+    const std::uint64_t elements = whole_number(count).value_or(file_bytes + 1);
+    if (elements > file_bytes) return false;
+    any = any || (name == "vertex" && elements > 0);
   }
   return false;
 }
@@ -137,8 +147,9 @@ DepthImage read_cloud_as_depth(const std::string& path, const Camera& camera) {
     any = true;
   }
   if (!any) {
-    throw InputError(path + ": no point projects into the camera's image; the cloud must be in the camera's frame (x "
-                            "right, y down, z forward, metres)");
+    throw InputError(path +
+                     ": no point projects into the camera's image; the cloud must be in the camera's frame (x "
+                     "right, y down, z forward, metres)");
   }
   return depth;
 }

@@ -1,9 +1,9 @@
 // Mutated PNG files fail their checksums; with these set right the fuzzer reaches what lies behind.
 #pragma once
 
-#include <zlib.h>
-
 #include <string>
+
+#include <zlib.h>
 
 namespace dofusion {
 
