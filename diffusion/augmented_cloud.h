@@ -1,7 +1,8 @@
 // The paper's augmented cloud, equation (4): points on every object with the signed distance to all other objects
-// merged and a flag for the object that is being placed.
+// merged and a flag for the object that is being placed; beside them the directions of surface and distance.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -17,6 +18,15 @@ namespace dofusion {
 // std::invalid_argument if there is no object or a volume is not positive.
 double normalised_length(const std::vector<double>& volumes);
 
+// What a cloud says of each point, in this order: position, signed distance to the other objects merged, 1 on the query
+// and else 0 (these five are the paper's); outward unit normal of the point's own surface; unit vector along which the
+// distance to the others grows (zero without others).
+inline constexpr int kCloudChannels = 11;
+
+// x, y and z of some points apart, each an array.
+using Columns = std::array<float*, 3>;
+using ConstColumns = std::array<const float*, 3>;
+
 // An object prepared for clouds: float triangles to draw points from and to measure distances to.
 class CloudShape {
  public:
@@ -26,11 +36,13 @@ class CloudShape {
 
   double volume() const { return volume_; }
 
-  // `count` points, uniform over the surface, own frame, metres: x, y, z apart, each (count).
-  void sample(int count, Rng& rng, float* x, float* y, float* z) const;
+  // `count` points, uniform over the surface, and their outward unit normals; own frame, metres.
+  void sample(int count, Rng& rng, const Columns& point, const Columns& normal) const;
 
-  // out[i] = min(out[i], signed distance of point i), metres. Exact, or from the object's grid; points (count) in this object's frame.
-  void min_distance(int count, const float* x, const float* y, const float* z, float* out) const;
+  // Signed distance of each point (own frame, metres) and the unit vector along which it grows. Exact outside; inside
+  // a solid of several convex parts it is that of the part that the point is deepest in. From the object's grid if it
+  // has one.
+  void signed_distance(int count, const ConstColumns& point, float* distance, const Columns& direction) const;
 
  private:
   struct Triangle {
@@ -38,26 +50,35 @@ class CloudShape {
     Eigen::Vector3f edge_start[3], edge[3], side[3];  // side: in the plane, pointing out of the triangle
     float edge_inverse_square[3];
   };
-  void prepare(const TriangleMesh& mesh);
+  using Triangles = std::vector<Triangle>;
+  static Triangles prepare(const TriangleMesh& mesh);
+  void set_surface(const TriangleMesh& mesh);
+  void box_distance(int count, const ConstColumns& point, float* distance, const Columns& direction) const;
+  void field_distance(int count, const ConstColumns& point, float* distance, const Columns& direction) const;
+  static void convex_distance(const Triangles& triangles, int count, const ConstColumns& point, float* distance,
+                              const Columns& direction);
 
-  std::vector<Triangle> triangles_;
-  std::vector<float> cumulative_area_;
+  Triangles surface_;
+  std::vector<float> cumulative_area_;  // of surface_
   std::optional<Eigen::Vector3f> half_edges_;
-  DistanceFunction distance_;  // of an object's grid, or of a solid that is not convex; else empty
+  std::vector<Triangles> parts_;  // convex solids that make up the object
+  DistanceFunction field_;        // of an object's grid, or of a solid without convex parts; else empty
   double volume_ = 0.0;
 };
 
 using CloudShapePtr = std::shared_ptr<const CloudShape>;
 
 struct CloudOptions {
-  int points = 192;             // shared out among the objects, the remainder to the query
+  int points = 192;             // of the whole cloud
+  int query_points = 0;         // of these, on the query; 0: all objects get equal shares, the query the remainder
   double length = 1.0;          // metres in the normalised length
   double distance_limit = 1.0;  // normalised: the SDF channel is clamped to +- this, and is this without others
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();  // world position that becomes 0, metres
 };
 
-// Fills cloud (points, 5): x, y, z, SDF, flag (1: query), lengths normalised, axes of the world. Points are drawn
-// afresh. T_world_object: one pose per shape, metres.
+// Fills cloud (points, kCloudChannels), lengths normalised, axes of the world. Points are drawn afresh; alone, the
+// query has them all. T_world_object: one pose per shape, metres. Throws std::invalid_argument if an object gets no
+// point.
 void make_augmented_cloud(const std::vector<CloudShapePtr>& shapes, const std::vector<Pose>& T_world_object, int query,
                           const CloudOptions& options, Rng& rng, float* cloud);
 

@@ -27,6 +27,10 @@ struct ModelConfig {
   int schedule_steps = 100;     // T of the discrete schedule (paper)
   double distance_limit = 1.0;  // the SDF channel is cut off here, and is this where there is no other
   std::vector<double> contact_scales = {0.1, 0.01};  // heights and distances also enter as v / (|v| + scale)
+  bool directions = false;    // surface normals and directions of the distance enter as well
+  double query_share = 0.0;   // of the points, on the query; 0: all objects get equal shares
+  int point_head = 0;         // hidden channels of the forces on the query's points (point_head.h); 0: none
+  bool equivalent = false;    // the target in training is the nearest of a symmetric shape's equal poses
   bool use_sdf = true;                               // ablations of table V
   bool use_pose = true;
 

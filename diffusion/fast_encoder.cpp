@@ -67,7 +67,7 @@ void FastEncoder::forward(const float* cloud, int points, float sigma, Saved& sa
   const float* coordinates[4];
   for (int d = 0; d < 4; ++d) {
     float* out = scratch.coordinates.data() + area(d, padded);
-    for (int i = 0; i < points; ++i) out[i] = cloud[5 * i + (d < 3 ? d : 4)];
+    for (int i = 0; i < points; ++i) out[i] = cloud[kCloudChannels * i + (d < 3 ? d : 4)];
     coordinates[d] = out;
   }
   saved.neighbours.resize(area(points, k));
@@ -121,9 +121,8 @@ void FastEncoder::forward(const float* cloud, int points, float sigma, Saved& sa
                            pooled + embedding_);
 }
 
-void FastEncoder::backward(const Saved& saved, int points, const float* d_pooled, Scratch& scratch,
-                           float* gradient) const {
-  const int k = config_.neighbours;
+float* FastEncoder::start_backward(const Saved& saved, int points, const float* d_pooled, Scratch& scratch,
+                                   float* gradient) const {
   // Mean pool: every point gets the same share.
   scratch.d_concatenated.resize(area(points, channels_));
   float* d_x = scratch.d_concatenated.data();
@@ -154,6 +153,12 @@ void FastEncoder::backward(const Saved& saved, int points, const float* d_pooled
                        gradient + embed_weight_ + area(j, channels_));
   }
 
+  return d_x;
+}
+
+void FastEncoder::backward(const Saved& saved, int points, Scratch& scratch, float* gradient) const {
+  const int k = config_.neighbours;
+  float* d_x = scratch.d_concatenated.data();
   for (std::size_t l = layers_.size(); l-- > 0;) {
     const Layer& layer = layers_[l];
     const int columns = 2 * layer.out;

@@ -25,6 +25,7 @@ class FastEncoder {
   void set_parameters(const float* parameters);
 
   int pooled() const { return embedding_ + channels_; }  // E + S
+  int channels() const { return channels_; }             // S
 
   // What the backward pass needs of one scene's forward pass.
   struct Saved {
@@ -51,11 +52,13 @@ class FastEncoder {
     std::vector<std::uint32_t> d_packed, x_pairs;
   };
 
-  // cloud (P, 5) -> pooled (E + S).
+  // cloud (P, kCloudChannels) -> pooled (E + S).
   void forward(const float* cloud, int points, float sigma, Saved& saved, Scratch& scratch, float* pooled) const;
 
-  // d_pooled (E + S) -> adds to `gradient`, the flat parameters' gradient.
-  void backward(const Saved& saved, int points, const float* d_pooled, Scratch& scratch, float* gradient) const;
+  // The gradient of the concatenated features (P, S), which backward() starts from, of the pooled ones (E + S).
+  float* start_backward(const Saved& saved, int points, const float* d_pooled, Scratch& scratch, float* gradient) const;
+  // From there to the parameters; both add to `gradient`, that of the flat parameters.
+  void backward(const Saved& saved, int points, Scratch& scratch, float* gradient) const;
 
  private:
   struct Layer {

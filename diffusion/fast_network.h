@@ -1,10 +1,11 @@
 // The `default` preset's network, forward and backward by hand, one scene at a time so that its tensors stay in the
 // second-level cache.
 //
-//   cloud (P, 5) -> features (P, F) -> graph of k nearest points on position and flag
+//   cloud (P, 11) -> features (P, F) -> graph of k nearest points on position and flag
 //   four edge convolutions: y_i = W_self x_i + max_j W_other x_j, layer norm, leaky ReLU; outputs concatenated (P, S)
 //   pooled = [leaky(layer norm(max_i W_embed x_i)), mean_i x_i]   (E + S)
-//   MLP on [pooled, noise features, pose features] -> hidden -> hidden -> 6
+//   MLP on [pooled, noise features, pose features] -> hidden -> hidden -> 6, to which the forces on the query's points
+//   are added (point_head.h), if the model has them
 //
 // The edge convolution is DGCNN's max_j W [x_i, x_j - x_i] with W_self = W1 - W2 and W_other = W2, exactly. Layer norm
 // stands after the maximum, where DGCNN has a batch norm before it. Because nothing but the maximum follows W_embed
@@ -43,7 +44,8 @@ class FastNetwork : public Network {
 };
 
 // Channels that the network derives of each point: x, y, z, SDF, flag, noise (log scale in [-1, 1]), then for each
-// contact scale s: z / (|z| + s) and SDF / (|SDF| + s). cloud: (points, 5); features: (points, row), row >= F.
+// contact scale s: z / (|z| + s) and SDF / (|SDF| + s), then normal and direction of the distance if the model takes
+// them. cloud: (points, kCloudChannels); features: (points, row), row >= F.
 void point_features(const ModelConfig& config, const float* cloud, int points, float sigma, float* features, int row);
 
 // log sigma scaled to [-1, 1] over the model's range, then sines and cosines of pi/2, pi, 3 pi/2, … times it.

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "diffusion/augmented_cloud.h"  // kCloudChannels
 #include "diffusion/config.h"
 
 namespace dofusion {
@@ -24,7 +25,7 @@ struct TensorInfo {
 struct NetworkInput {
   int batch = 0;             // B
   int points = 0;            // P, even
-  std::vector<float> cloud;  // (B, P, 5): x, y, z, SDF to the merged others, 1 for points of the query
+  std::vector<float> cloud;  // (B, P, kCloudChannels), as make_augmented_cloud fills it
   std::vector<float> pose;   // (B, pose_features)
   std::vector<float> sigma;  // (B): noise scale
 };

@@ -84,8 +84,8 @@ class TorchNetwork : public Network {
     return {flat.data_ptr<float>(), flat.data_ptr<float>() + flat.numel()};
   }
 
-  Tensor cloud_of(const NetworkInput& input) const {  // (B, P, 5)
-    return torch::tensor(input.cloud).to(type_).view({input.batch, input.points, 5});
+  Tensor cloud_of(const NetworkInput& input) const {  // (B, P, 5): the paper's channels
+    return torch::tensor(input.cloud).to(type_).view({input.batch, input.points, kCloudChannels}).narrow(2, 0, 5);
   }
   Tensor pose_of(const NetworkInput& input) const {  // (B, pose features)
     const Tensor pose = torch::tensor(input.pose).to(type_).view({input.batch, config_.pose_features()});
@@ -223,7 +223,7 @@ class ReferenceNetwork : public TorchNetwork {
     const int noise_count = 1 + 2 * config_.noise_frequencies;
     std::vector<float> noise(static_cast<std::size_t>(B) * noise_count);
     for (int b = 0; b < B; ++b) {
-      point_features(config_, input.cloud.data() + static_cast<std::size_t>(b) * P * 5, P, input.sigma[b],
+      point_features(config_, input.cloud.data() + static_cast<std::size_t>(b) * P * kCloudChannels, P, input.sigma[b],
                      features.data() + static_cast<std::size_t>(b) * P * F, F);
       noise_features(config_, input.sigma[b], noise.data() + static_cast<std::size_t>(b) * noise_count);
     }
@@ -245,15 +245,37 @@ class ReferenceNetwork : public TorchNetwork {
     const Tensor pooled = torch::leaky_relu(norm("encoder.embed", best, parameters), kSlope);
     Tensor y =
         torch::cat({pooled, points.mean(1), torch::tensor(noise).to(type_).view({B, noise_count}), pose_of(input)}, 1);
+    Tensor scene;
     for (int l = 1; l <= 3; ++l) {
       const std::string name = "mlp." + std::to_string(l);
+      if (l == 3) scene = y;
       y = y.matmul(get(parameters, name + ".weight")) + get(parameters, name + ".bias");
+      if (l == 3 && config_.point_head > 0) return y + forces(input, points, scene, parameters);
       if (l < 3) y = torch::leaky_relu(y, kSlope);
     }
     return y;
   }
 
  private:
+  // What point_head.h adds to the output. points (B, P, S), scene (B, hidden).
+  Tensor forces(const NetworkInput& input, const Tensor& points, const Tensor& scene, const Tensor& parameters) const {
+    const Tensor cloud = cloud_of(input), on_query = cloud.select(2, 4).unsqueeze(2);  // (B, P, 1)
+    const Tensor count = on_query.sum(1);                                              // (B, 1)
+    const Tensor scene_term =
+        scene.matmul(get(parameters, "head.scene.weight")) + get(parameters, "head.bias");  // (B, H)
+    const Tensor hidden = torch::leaky_relu(
+        points.matmul(get(parameters, "head.local.weight")) + scene_term.unsqueeze(1), kSlope);  // (B, P, H)
+    const Tensor force = hidden.matmul(get(parameters, "head.force.weight")) * on_query;         // (B, P, 3)
+    const Tensor position = cloud.narrow(2, 0, 3);
+    Tensor origin = torch::zeros({input.batch, 3}, torch::dtype(type_));
+    if (config_.use_pose)
+      origin.select(1, 2).copy_(pose_of(input).select(1, 9));
+    else
+      origin.select(1, 2).copy_(((position * on_query).sum(1) / count).select(1, 2));
+    const Tensor moment = torch::cross((position - origin.unsqueeze(1)), force, 2);
+    return torch::cat({force.sum(1) / count, moment.sum(1) / count}, 1);
+  }
+
   Tensor norm(const std::string& name, const Tensor& x, const Tensor& parameters) const {
     return torch::layer_norm(x, {x.size(-1)}, get(parameters, name + ".norm.weight"),
                              get(parameters, name + ".norm.bias"), 1e-5);

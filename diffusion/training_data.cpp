@@ -6,6 +6,7 @@
 #include "diffusion/schedule.h"
 #include "diffusion/se3_noise.h"
 #include "stability/files.h"
+#include "stability/mesh_symmetry.h"
 
 namespace dofusion {
 namespace {
@@ -34,7 +35,9 @@ TrainingSet::TrainingSet(std::vector<SceneDataset> datasets, const ModelConfig& 
   for (SceneDataset& dataset : datasets) {
     const int first = static_cast<int>(shapes_.size());
     for (const ObjectPtr& object : dataset.shapes) {
-      shapes_.push_back({object, object->convex && mirrors_in_y(object->mesh)});
+      std::vector<Eigen::Matrix3d> symmetries;
+      if (config_.equivalent) symmetries = rotation_symmetries(object->mesh);
+      shapes_.push_back({object, object->convex && mirrors_in_y(object->mesh), std::move(symmetries)});
     }
     for (SceneRecord& record : dataset.scenes) {
       for (SceneObject& object : record.objects) {
@@ -56,8 +59,39 @@ CloudShapePtr TrainingSet::cloud_shape(const Shape& shape, const Eigen::Vector3d
   return std::make_shared<CloudShape>(scaled(object.mesh, scale), edges);
 }
 
+// Of the poses in which the query looks as in the clean one, the nearest in angle to the noisy one: the mean over equal
+// poses, which the network would learn instead, means nothing.
+Pose TrainingSet::nearest_equivalent(const Shape& shape, const Eigen::Vector3d& scale, const Pose& clean,
+                                     const Pose& noisy) const {
+  Pose nearest = clean;
+  const auto likeness = [&](const Eigen::Matrix3d& R) { return (noisy.linear().transpose() * R).trace(); };
+  double best = likeness(clean.linear());
+  const auto consider = [&](const Eigen::Matrix3d& R) {
+    if (likeness(R) <= best) return;
+    best = likeness(R);
+    nearest.linear() = R;
+  };
+  if (shape.object->kind == SolidKind::kSphere) {
+    consider(noisy.linear());
+  } else if (shape.object->kind == SolidKind::kCylinder) {
+    for (const double flip : {0.0, M_PI}) {
+      const Eigen::Matrix3d R = clean.linear() * Eigen::AngleAxisd(flip, Eigen::Vector3d::UnitX()).toRotationMatrix();
+      const Eigen::Matrix3d M = noisy.linear().transpose() * R;
+      const double turn = std::atan2(M(0, 1) - M(1, 0), M(0, 0) + M(1, 1));
+      consider(R * Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ()).toRotationMatrix());
+    }
+  } else {
+    for (const Eigen::Matrix3d& symmetry : shape.symmetries) {
+      // A stretched shape keeps the rotations that stretching leaves rotations.
+      const Eigen::Matrix3d stretched = scale.asDiagonal() * symmetry * scale.cwiseInverse().asDiagonal();
+      if ((stretched - symmetry).norm() < 1e-6) consider(clean.linear() * symmetry);
+    }
+  }
+  return nearest;
+}
+
 void TrainingSet::append(std::uint64_t seed, std::uint64_t example, NetworkInput& batch,
-                         std::vector<float>& target) const {
+                         std::vector<float>& target_values) const {
   Rng rng = make_rng(seed, example);
   const auto& objects = scenes_[static_cast<std::size_t>(uniform_int(rng, 0, static_cast<int>(scenes_.size()) - 1))];
   const int count = static_cast<int>(objects.size());
@@ -86,10 +120,13 @@ void TrainingSet::append(std::uint64_t seed, std::uint64_t example, NetworkInput
     wanted = noise / sigma;
   } else {
     poses[query] = add_world_noise(clean, noise, length);
-    wanted = world_residual(poses[query], clean, sigma, length);
+    const SceneObject& object = objects[static_cast<std::size_t>(query)];
+    const Pose target =
+        config_.equivalent ? nearest_equivalent(shapes_[object.shape], object.scale, clean, poses[query]) : clean;
+    wanted = world_residual(poses[query], target, sigma, length);
   }
   append_input(config_, shapes, poses, query, length, sigma, Eigen::Vector2d::Zero(), config_.points, rng, batch);
-  for (int i = 0; i < 6; ++i) target.push_back(static_cast<float>(wanted[i]));
+  for (int i = 0; i < 6; ++i) target_values.push_back(static_cast<float>(wanted[i]));
 }
 
 void append_input(const ModelConfig& config, const std::vector<CloudShapePtr>& shapes,
@@ -99,12 +136,13 @@ void append_input(const ModelConfig& config, const std::vector<CloudShapePtr>& s
   const Pose& pose = T_world_object[query];
   CloudOptions options;
   options.points = points;
+  options.query_points = static_cast<int>(std::lround(config.query_share * points));
   options.length = length;
   options.distance_limit = config.distance_limit;
   options.origin.head<2>() = paper ? origin : pose.translation().head<2>();
   const std::size_t start = batch.cloud.size();
   batch.points = points;
-  batch.cloud.resize(start + static_cast<std::size_t>(points) * 5);
+  batch.cloud.resize(start + static_cast<std::size_t>(points) * kCloudChannels);
   make_augmented_cloud(shapes, T_world_object, query, options, rng, batch.cloud.data() + start);
   if (paper) {
     const Eigen::Vector3d position = (pose.translation() - options.origin) / length, turn = so3_log(pose.linear());

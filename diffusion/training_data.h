@@ -28,8 +28,10 @@ class TrainingSet {
   struct Shape {
     ObjectPtr object;      // at scale 1
     bool mirrors = false;  // its own mirror image in y
+    std::vector<Eigen::Matrix3d> symmetries;
   };
   CloudShapePtr cloud_shape(const Shape& shape, const Eigen::Vector3d& scale) const;
+  Pose nearest_equivalent(const Shape& shape, const Eigen::Vector3d& scale, const Pose& clean, const Pose& noisy) const;
 
   ModelConfig config_;
   std::vector<Shape> shapes_;

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "perception/mesh_symmetry.h"
+#include "stability/mesh_symmetry.h"
 #include "stability/resting_poses.h"
 #include "stability/scene.h"
 #include "stability/sdf.h"

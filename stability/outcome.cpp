@@ -53,6 +53,13 @@ Outcome judge(const std::vector<ObjectPtr>& objects, const std::vector<Pose>& be
   }
   Outcome outcome = judge(diameters_of(objects), before, settled);
   outcome.stacked = is_stacked(objects, before, settled, query);
+  for (const auto& [first, second] : settled.touching) {
+    if (first != query && second != query) continue;
+    if (first == -1)
+      outcome.on_table = true;
+    else
+      ++outcome.touches;
+  }
   return outcome;
 }
 

@@ -19,6 +19,8 @@ struct Outcome {
   bool quiet = false;                   // settled, and accumulated rotation below 10 degrees (UOP-Net's success)
   bool tilted = false;                  // something ended tilted by more than 20 degrees
   bool stacked = false;                 // see is_stacked
+  bool on_table = false;                // the query touches the table at the end
+  int touches = 0;                      // context objects that the query touches at the end
 };
 
 // The stacking success: the scene settled, every context object stayed within 10 % and 10 degrees, and the query rests

@@ -1,4 +1,5 @@
 #include "apps/evaluation.h"
+#include "apps/evaluation_tables.h"
 
 #include <cmath>
 
@@ -119,8 +120,8 @@ TEST(TableRows, MedianIntervalBaselineAndThePapersFigures) {
     ours[i].stable = i != 0;
     random[i].displacement = {80.0, std::numeric_limits<double>::infinity()};
   }
-  const nlohmann::json rows = table_rows("unstructured", instances, ours, random, 9);
-  ASSERT_EQ(rows.size(), 12u);  // the cube and all blocks, in six columns
+  const nlohmann::json rows = table_rows("unstructured", instances, {ours, {}, random}, 9);
+  ASSERT_EQ(rows.size(), 14u);  // the cube and all blocks, in seven columns
   const nlohmann::json& cube = rows[0];
   EXPECT_EQ(cube["block"], "Cube");
   EXPECT_EQ(cube["column"], "Trans. Disp. (%)");
@@ -130,14 +131,16 @@ TEST(TableRows, MedianIntervalBaselineAndThePapersFigures) {
   EXPECT_GE(cube["dofusion_95"][0].get<double>(), 1.0);
   EXPECT_LE(cube["dofusion_95"][1].get<double>(), 3.0);
   EXPECT_EQ(cube["random"], 80.0);
+  EXPECT_TRUE(cube["dofusion_ood"].is_null());
   EXPECT_EQ(cube["paper"], 2.3);
+  EXPECT_EQ(cube["paper_ood"], 2.7);
   EXPECT_EQ(cube["paper_random"], 103.1);
-  EXPECT_EQ(rows[1]["block"], "All blocks");
+  EXPECT_EQ(rows[1]["block"], "All");
   EXPECT_EQ(rows[1]["paper"], 13.1);
   EXPECT_TRUE(rows[2]["random"].is_null());  // infinite: the simulations diverged
   EXPECT_NEAR(rows[4]["dofusion"].get<double>(), 200.0 / 3.0, 1e-9);
   EXPECT_THAT(format_rows(rows), testing::AllOf(testing::HasSubstr("Cube"), testing::HasSubstr("103.1")));
-  EXPECT_THROW(table_rows("nonsense", instances, ours, random, 9), std::invalid_argument);
+  EXPECT_THROW(table_rows("nonsense", instances, {ours, {}, random}, 9), std::invalid_argument);
 }
 
 }  // namespace

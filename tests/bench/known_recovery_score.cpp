@@ -16,7 +16,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "perception/known_recovery.h"
-#include "perception/mesh_symmetry.h"
+#include "stability/mesh_symmetry.h"
 #include "perception/segmentation.h"
 #include "perception/synthetic_view.h"
 #include "perception/table.h"

@@ -15,8 +15,8 @@ NetworkInput random_input(const ModelConfig& config, int batch) {
   input.batch = batch;
   input.points = config.points;
   for (int i = 0; i < batch * config.points; ++i) {
-    for (int d = 0; d < 4; ++d) input.cloud.push_back(static_cast<float>(normal(rng)));
-    input.cloud.push_back(i % 3 == 0 ? 1.0f : 0.0f);
+    for (int d = 0; d < kCloudChannels; ++d) input.cloud.push_back(static_cast<float>(normal(rng)));
+    input.cloud[input.cloud.size() - kCloudChannels + 4] = i % 3 == 0 ? 1.0f : 0.0f;
   }
   for (int i = 0; i < batch * config.pose_features(); ++i) input.pose.push_back(static_cast<float>(normal(rng)));
   input.sigma.assign(batch, 0.1f);

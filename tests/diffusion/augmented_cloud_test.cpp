@@ -15,7 +15,7 @@ constexpr double kTolerance = 5e-7;
 std::vector<float> cloud_of(const Scene& scene, int query, const CloudOptions& options, std::uint64_t seed = 0) {
   std::vector<CloudShapePtr> shapes;
   for (const ObjectPtr& object : scene.objects) shapes.push_back(std::make_shared<CloudShape>(*object));
-  std::vector<float> cloud(static_cast<std::size_t>(options.points) * 5);
+  std::vector<float> cloud(static_cast<std::size_t>(options.points) * kCloudChannels);
   Rng rng = make_rng(seed);
   make_augmented_cloud(shapes, scene.T_world_object, query, options, rng, cloud.data());
   return cloud;
@@ -45,7 +45,7 @@ TEST(AugmentedCloud, DistanceOfStackedCubesIsTheirGap) {
   const std::vector<float> cloud = cloud_of(two_cubes(gap), 1, options);
   double least = 1e9;
   for (int i = 0; i < options.points; ++i) {
-    const float* p = &cloud[5 * i];
+    const float* p = &cloud[kCloudChannels * i];
     const double z = p[2] * options.length, distance = p[3] * options.length;
     // Both cubes have the same x and y extent, so the distance of any point is that along z to the other's face.
     const bool query = p[4] == 1.0f;
@@ -64,8 +64,8 @@ TEST(AugmentedCloud, OverlapIsNegativeAndClamped) {
   const std::vector<float> cloud = cloud_of(two_cubes(-0.02), 1, options);
   float low = 1, high = -1;
   for (int i = 0; i < options.points; ++i) {
-    low = std::min(low, cloud[5 * i + 3]);
-    high = std::max(high, cloud[5 * i + 3]);
+    low = std::min(low, cloud[kCloudChannels * i + 3]);
+    high = std::max(high, cloud[kCloudChannels * i + 3]);
   }
   EXPECT_LT(low, 0.0f);
   EXPECT_FLOAT_EQ(high, 0.2f);
@@ -85,10 +85,10 @@ TEST(AugmentedCloud, AloneTheDistanceIsTheLimitAndPointsLieOnTheSurface) {
   const MeshDistance distance(hat->mesh);
   for (int i = 0; i < options.points; ++i) {
     const Eigen::Vector3d p_world =
-        Eigen::Vector3d(cloud[5 * i], cloud[5 * i + 1], cloud[5 * i + 2]) * options.length + options.origin;
+        Eigen::Vector3d(cloud[kCloudChannels * i], cloud[kCloudChannels * i + 1], cloud[kCloudChannels * i + 2]) * options.length + options.origin;
     EXPECT_NEAR(distance(pose.inverse() * p_world), 0.0, kTolerance);
-    EXPECT_EQ(cloud[5 * i + 3], 1.0f);
-    EXPECT_EQ(cloud[5 * i + 4], 1.0f);
+    EXPECT_EQ(cloud[kCloudChannels * i + 3], 1.0f);
+    EXPECT_EQ(cloud[kCloudChannels * i + 4], 1.0f);
   }
 }
 
@@ -100,7 +100,7 @@ TEST(AugmentedCloud, RemainderGoesToTheQuery) {
   options.points = 100;
   const std::vector<float> cloud = cloud_of(scene, 1, options);
   int flagged = 0;
-  for (int i = 0; i < 100; ++i) flagged += cloud[5 * i + 4] == 1.0f;
+  for (int i = 0; i < 100; ++i) flagged += cloud[kCloudChannels * i + 4] == 1.0f;
   EXPECT_EQ(flagged, 34);
 }
 
@@ -125,12 +125,21 @@ TEST(CloudShape, DistanceAgreesWithTheExactOne) {
       y[i] = static_cast<float>(p.y());
       z[i] = static_cast<float>(p.z());
     }
-    shape.min_distance(count, x.data(), y.data(), z.data(), fast.data());
-    as_mesh.min_distance(count, x.data(), y.data(), z.data(), mesh.data());
+    const ConstColumns points{x.data(), y.data(), z.data()};
+    std::vector<float> dx(count), dy(count), dz(count), mx(count), my(count), mz(count);
+    shape.signed_distance(count, points, fast.data(), {dx.data(), dy.data(), dz.data()});
+    as_mesh.signed_distance(count, points, mesh.data(), {mx.data(), my.data(), mz.data()});
     for (int i = 0; i < count; ++i) {
       const double wanted = exact(Eigen::Vector3d(x[i], y[i], z[i]));
       EXPECT_NEAR(fast[i], wanted, kTolerance) << object->name;
       EXPECT_NEAR(mesh[i], wanted, kTolerance) << object->name;
+      // Along the direction the distance grows as fast as the point moves, away from where directions meet.
+      const double step = 1e-6;
+      const Eigen::Vector3d p(x[i], y[i], z[i]), along(dx[i], dy[i], dz[i]), along_mesh(mx[i], my[i], mz[i]);
+      EXPECT_NEAR(along.norm(), 1.0, 1e-5);
+      EXPECT_NEAR(along_mesh.norm(), 1.0, 1e-5);
+      EXPECT_NEAR((exact(p + step * along) - wanted) / step, 1.0, 1e-2) << object->name;
+      EXPECT_NEAR((exact(p + step * along_mesh) - wanted) / step, 1.0, 1e-2) << object->name;
     }
   }
 }
@@ -138,12 +147,15 @@ TEST(CloudShape, DistanceAgreesWithTheExactOne) {
 TEST(CloudShape, DrawsUniformlyOverTheSurface) {
   const CloudShape plank(*make_box("plank", {0.2, 0.1, 0.02}));
   const int count = 20000;
-  std::vector<float> x(count), y(count), z(count);
+  std::vector<float> x(count), y(count), z(count), nx(count), ny(count), nz(count);
   Rng rng = make_rng(6);
-  plank.sample(count, rng, x.data(), y.data(), z.data());
+  plank.sample(count, rng, {x.data(), y.data(), z.data()}, {nx.data(), ny.data(), nz.data()});
   int on_large_faces = 0;
   double sum_x = 0.0;
   for (int i = 0; i < count; ++i) {
+    const bool large = std::abs(nz[i]) > 0.5f;
+    EXPECT_NEAR(large ? nz[i] * z[i] : std::abs(nx[i]) > 0.5f ? nx[i] * x[i] : ny[i] * y[i],
+                large ? 0.01 : std::abs(nx[i]) > 0.5f ? 0.1 : 0.05, 1e-6);  // outward
     on_large_faces += std::abs(std::abs(z[i]) - 0.01f) < 1e-7f;
     sum_x += x[i];
   }

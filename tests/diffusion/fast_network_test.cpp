@@ -19,6 +19,8 @@ ModelConfig small_config() {
   config.widths = {32, 64, 32};
   config.embedding = 64;
   config.hidden = 64;
+  config.directions = true;
+  config.point_head = 32;
   return config;
 }
 
@@ -28,8 +30,8 @@ NetworkInput random_input(const ModelConfig& config, int batch, std::uint64_t se
   input.batch = batch;
   input.points = config.points;
   for (int i = 0; i < batch * config.points; ++i) {
-    for (int d = 0; d < 4; ++d) input.cloud.push_back(static_cast<float>(normal(rng)));
-    input.cloud.push_back(i % 3 == 0 ? 1.0f : 0.0f);
+    for (int d = 0; d < kCloudChannels; ++d) input.cloud.push_back(static_cast<float>(normal(rng)));
+    input.cloud[input.cloud.size() - kCloudChannels + 4] = i % 3 == 0 ? 1.0f : 0.0f;
   }
   for (int i = 0; i < batch * config.pose_features(); ++i) input.pose.push_back(static_cast<float>(normal(rng)));
   for (int i = 0; i < batch; ++i) input.sigma.push_back(static_cast<float>(std::exp(uniform(rng, -5.0, 1.0))));
@@ -43,7 +45,7 @@ std::vector<float> random_parameters(const Network& network, std::uint64_t seed)
     const bool matrix = t.shape.size() > 1;
     for (std::size_t i = 0; i < t.size; ++i)
       parameters[t.offset + i] += static_cast<float>(normal(rng, matrix ? 0.0 : 0.2));
-    if (t.name == "mlp.3.weight")
+    if (t.name == "mlp.3.weight" || t.name == "head.force.weight")
       for (std::size_t i = 0; i < t.size; ++i) parameters[t.offset + i] *= 20.0f;
   }
   return parameters;

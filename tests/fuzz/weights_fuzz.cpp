@@ -1,5 +1,5 @@
 // Safetensors, and an entry of a generation journal.
-#include "diffusion/weights.h"
+#include "diffusion/safetensors.h"
 #include "stability/dataset_journal.h"
 #include "tests/fuzz/fuzz_file.h"
 

@@ -1,31 +1,15 @@
-#include "perception/mesh_symmetry.h"
+#include "perception/object_model.h"
 
 #include <map>
 
 #include <gtest/gtest.h>
 
-#include "perception/object_model.h"
 #include "stability/shapes.h"
 
 namespace dofusion {
 namespace {
 
-// The rotation groups of the seven blocks, from geometry: cube, two square cuboids' (D4; 4 x 2 x 1 only D2), a
-// scalene, two isosceles prisms (C1, C2), a square pyramid (C4).
-TEST(MeshSymmetry, GroupsOfTheBlocks) {
-  const std::map<std::string, std::size_t> order = {
-      {"cube", 24},       {"rectangle", 8}, {"half_rectangle", 4}, {"tall_triangle", 1}, {"middle_triangle", 2},
-      {"tetrahedron", 4}, {"hat", 2}};
-  for (const auto& [name, count] : order) {
-    const TriangleMesh mesh = make_block(name)->mesh;
-    const std::vector<Eigen::Matrix3d> symmetries = rotation_symmetries(mesh);
-    EXPECT_EQ(symmetries.size(), count) << name;
-    EXPECT_TRUE(symmetries.front().isIdentity()) << name;
-    for (const Eigen::Matrix3d& R : symmetries) EXPECT_NEAR(R.determinant(), 1.0, 1e-9) << name;
-  }
-}
-
-TEST(MeshSymmetry, FacesOfTheBlocks) {
+TEST(ObjectModel, FacesOfTheBlocks) {
   const std::map<std::string, std::pair<std::size_t, std::size_t>> faces = {{"cube", {6, 1}},
                                                                             {"rectangle", {6, 2}},
                                                                             {"half_rectangle", {6, 3}},

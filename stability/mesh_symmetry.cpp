@@ -1,11 +1,9 @@
-#include "perception/mesh_symmetry.h"
+#include "stability/mesh_symmetry.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Geometry>
-
-#include "stability/convex_hull.h"
+#include <Eigen/Dense>
 
 namespace dofusion {
 namespace {
@@ -33,8 +31,24 @@ Eigen::Matrix3d frame_of(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return frame;
 }
 
+// The vertices at which the surface bends in more than one direction: those in the middle of a face or of an edge say
+// how it was cut into triangles, not what its shape is.
 std::vector<Eigen::Vector3d> corners_of(const TriangleMesh& mesh) {
-  return is_convex(mesh) ? convex_hull(mesh.vertices).vertices : weld(mesh).vertices;
+  const TriangleMesh welded = weld(mesh);
+  std::vector<Eigen::Matrix3d> spread(welded.vertices.size(), Eigen::Matrix3d::Zero());  // of the normals at a vertex
+  for (const Eigen::Vector3i& triangle : welded.triangles) {
+    const Eigen::Vector3d& a = welded.vertices[triangle[0]];
+    const Eigen::Vector3d normal =
+        (welded.vertices[triangle[1]] - a).cross(welded.vertices[triangle[2]] - a).stableNormalized();
+    for (int k = 0; k < 3; ++k) spread[triangle[k]] += normal * normal.transpose();
+  }
+  constexpr double kFlat = 1e-8;  // square of the sine of 1e-4 rad
+  std::vector<Eigen::Vector3d> corners;
+  for (std::size_t i = 0; i < spread.size(); ++i) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(spread[i], Eigen::EigenvaluesOnly);
+    if (axes.eigenvalues()[0] > kFlat) corners.push_back(welded.vertices[i]);
+  }
+  return corners;
 }
 
 // The corner that makes the best frame with the first one.
