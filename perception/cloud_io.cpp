@@ -1,8 +1,10 @@
 #include "perception/cloud_io.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -12,12 +14,12 @@
 #include <sstream>
 #include <vector>
 
-#include <pcl/console/print.h>
 #include <pcl/io/pcd_io.h>
 #include <pcl/io/ply_io.h>
 #include <pcl/point_types.h>
 
 #include "perception/pcl_conversions.h"
+#include "stability/child_process.h"
 #include "stability/files.h"
 
 namespace dofusion {
@@ -49,7 +51,8 @@ std::optional<std::uint64_t> point_bytes(const Words& fields, const Words& sizes
   return bytes;
 }
 
-// PCL's reader trusts a PCD's header: some damaged ones crash it, and memory is taken for as many points as promised.
+// PCL's readers trust a header: memory is taken for as many points as promised, and damaged files crash them (a PLY's
+// list among its vertices) or keep them for ever. So a child process reads, after a look at the header.
 // True if the header makes sense and its points have room in the file.
 bool has_sane_pcd_header(const std::string& path) {
   constexpr int kMostLines = 200;
@@ -106,6 +109,49 @@ bool has_sane_ply_header(const std::string& path) {
   return false;
 }
 
+// The header's numbers, then x, y, z of every point.
+struct PackedHeader {
+  std::uint32_t width = 0, height = 0, is_dense = 0;
+};
+using PackedPoint = std::array<float, 3>;
+
+std::string packed(const Cloud& cloud) {
+  const PackedHeader header{cloud.width, cloud.height, cloud.is_dense ? 1U : 0U};
+  std::vector<PackedPoint> points;
+  for (const pcl::PointXYZ& p : cloud) points.push_back({p.x, p.y, p.z});
+  return std::string(reinterpret_cast<const char*>(&header), sizeof header) +
+         std::string(reinterpret_cast<const char*>(points.data()), points.size() * sizeof(PackedPoint));
+}
+
+// Empty if the bytes are not those of a cloud.
+Cloud unpacked(const std::string& bytes) {
+  PackedHeader header;
+  if (bytes.size() < sizeof header) return {};
+  std::memcpy(&header, bytes.data(), sizeof header);
+  const std::size_t count = (bytes.size() - sizeof header) / sizeof(PackedPoint);
+  if (std::uint64_t{header.width} * header.height != count || count == 0) return {};
+  Cloud cloud(header.width, header.height);
+  cloud.is_dense = header.is_dense != 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    PackedPoint p;
+    std::memcpy(p.data(), bytes.data() + sizeof header + i * sizeof p, sizeof p);
+    cloud[i] = {p[0], p[1], p[2]};
+  }
+  return cloud;
+}
+
+constexpr int kRead = 0, kRefused = 3;  // exit statuses of the child
+
+int read_in_child(const std::string& path, bool is_pcd, int pipe) {
+  Cloud cloud;
+  try {
+    const int status = is_pcd ? pcl::PCDReader().read(path, cloud) : pcl::PLYReader().read(path, cloud);
+    return status >= 0 && !cloud.empty() && write_all(pipe, packed(cloud)) ? kRead : kRefused;
+  } catch (const std::exception&) {
+    return kRefused;  // PCL throws on some damaged headers and returns a status on others
+  }
+}
+
 }  // namespace
 
 Cloud read_cloud(const std::string& path) {
@@ -113,23 +159,15 @@ Cloud read_cloud(const std::string& path) {
   if (!std::filesystem::is_regular_file(path, error)) throw InputError(path + ": no such cloud file");
   std::string extension = std::filesystem::path(path).extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(), ::tolower);
-  pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS);  // our own line says what is wrong
+  const bool is_pcd = extension == ".pcd";
+  if (!is_pcd && extension != ".ply") throw InputError(path + ": a cloud must be a .pcd or .ply file");
   Cloud cloud;
-  int status = -1;
-  try {
-    if (extension == ".pcd") {
-      if (has_sane_pcd_header(path)) status = pcl::PCDReader().read(path, cloud);
-    } else if (extension == ".ply") {
-      if (has_sane_ply_header(path)) status = pcl::PLYReader().read(path, cloud);
-    } else {
-      throw InputError(path + ": a cloud must be a .pcd or .ply file");
-    }
-  } catch (const InputError&) {
-    throw;
-  } catch (const std::exception&) {
-    status = -1;  // PCL throws on some damaged headers and returns a status on others
+  if (is_pcd ? has_sane_pcd_header(path) : has_sane_ply_header(path)) {
+    const ChildResult child = run_in_child([&](int pipe) { return read_in_child(path, is_pcd, pipe); },
+                                           reading_seconds(static_cast<double>(std::filesystem::file_size(path))));
+    if (child.end == ChildResult::End::kReturned && child.status == kRead) cloud = unpacked(child.output);
   }
-  if (status < 0 || cloud.empty()) throw InputError(path + ": damaged, or without points");
+  if (cloud.empty()) throw InputError(path + ": damaged, or without points");
   return cloud;
 }
 

@@ -1,5 +1,5 @@
 // Work on a user's file in a safe place: libraries that read files may crash on them, never return, take all memory or
-// end the process. Private to stability.
+// end the process.
 #pragma once
 
 #include <functional>
@@ -17,5 +17,8 @@ struct ChildResult {
 // processor time and 8 GB. Its standard streams lead nowhere; signals have their default effect. Throws
 // std::runtime_error if there can be no child.
 ChildResult run_in_child(const std::function<int(int pipe)>& work, unsigned cpu_seconds);
+
+// Processor time for a library that reads a file of so many bytes: far more than a good file takes.
+inline unsigned reading_seconds(double file_bytes) { return static_cast<unsigned>(2.0 + file_bytes / 5e5); }
 
 }  // namespace dofusion

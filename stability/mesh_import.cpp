@@ -76,7 +76,7 @@ bool unpack(const std::string& bytes, ImportedMesh& mesh) {
 }  // namespace
 
 ImportedMesh import_mesh(const std::string& path, std::size_t most_triangles) {
-  const auto seconds = static_cast<unsigned>(2 + std::filesystem::file_size(path) / 500000);
+  const unsigned seconds = reading_seconds(static_cast<double>(std::filesystem::file_size(path)));
   const ChildResult child =
       run_in_child([&](int pipe) { return import_in_child(path, most_triangles, pipe); }, seconds);
   if (child.end == ChildResult::End::kOutOfTime) {
