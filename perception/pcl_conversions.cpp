@@ -72,7 +72,9 @@ std::optional<CloudView> virtual_view(const Cloud& cloud, int width) {
   // No more pixels than points, so that the image has few holes.
   const double shape = span.y() / span.x();
   const int columns = std::clamp(static_cast<int>(std::sqrt(0.7 * readings / shape)), 2, std::max(2, width));
-  const double focal = (columns - 1) / span.x();
+  // Not many more rows than columns either: a cloud like a needle would need millions.
+  const int most_rows = 4 * std::max(2, width);
+  const double focal = std::min((columns - 1) / span.x(), (most_rows - 2) / span.y());
   const int rows = static_cast<int>(std::ceil(focal * span.y())) + 1;
   CloudView view{{focal, focal, -focal * low.x(), -focal * low.y(), columns, rows, 1.0}, DepthImage(columns, rows)};
   for (const pcl::PointXYZ& p : cloud) {
@@ -117,7 +119,9 @@ Cloud to_cloud(const DepthImage& depth, const Camera& camera) {
   for (int v = 0; v < depth.height; ++v) {
     for (int u = 0; u < depth.width; ++u) {
       if (!is_valid_depth(depth.at(v, u))) continue;
-      cloud.at(u, v).getVector3fMap() = unproject(camera, u, v, depth.at(v, u)).cast<float>();
+      // By index: PCL's at(column, row) refuses a cloud of one row.
+      cloud[static_cast<std::size_t>(v) * depth.width + u].getVector3fMap() =
+          unproject(camera, u, v, depth.at(v, u)).cast<float>();
     }
   }
   return cloud;

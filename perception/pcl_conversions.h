@@ -33,7 +33,7 @@ struct CloudView {
 
 // An organised cloud keeps its pixels, and its camera is found from the points; an unorganised one (or an organised one
 // that no pinhole camera explains) is seen from the origin by a camera of `width` pixels that spans it, the nearest
-// point counting in each pixel. Points that are not finite or not before the camera are left out; nullopt if fewer
+// point counting in each pixel; it has four times as many rows at most. Points that are not finite or not before the camera are left out; nullopt if fewer
 // than three remain.
 std::optional<CloudView> view_cloud(const Cloud& cloud, int width = 640);
 
