@@ -88,15 +88,28 @@ std::optional<CloudView> virtual_view(const Cloud& cloud, int width) {
   return view;
 }
 
-// RANSAC and least squares by PCL, in space; the camera is at the origin, below no table.
-std::optional<Table> cloud_table(const Cloud::ConstPtr& points, double band) {
-  auto model = std::make_shared<pcl::SampleConsensusModelPlane<pcl::PointXYZ>>(points);
-  pcl::RandomSampleConsensus<pcl::PointXYZ> ransac(model, band);
+// Every n-th point, so that no more than so many remain.
+Cloud::Ptr thinned(const Cloud& cloud, std::size_t most) {
+  auto some = std::make_shared<Cloud>();
+  for (std::size_t i = 0; i < cloud.size(); i += cloud.size() / most + 1) some->push_back(cloud[i]);
+  return some;
+}
+
+// RANSAC on some of the points and least squares on all near the plane found, by PCL, in space; the camera is at the
+// origin, below no table.
+std::optional<Table> cloud_table(const Cloud::ConstPtr& points, double band, double min_share) {
+  constexpr std::size_t kMostRansacPoints = 6000;
+  constexpr int kIterations = 400;
+  pcl::RandomSampleConsensus<pcl::PointXYZ> ransac(
+      std::make_shared<pcl::SampleConsensusModelPlane<pcl::PointXYZ>>(thinned(*points, kMostRansacPoints)), band);
+  ransac.setMaxIterations(kIterations);
   if (!ransac.computeModel()) return std::nullopt;
   Eigen::VectorXf rough, fine;
   std::vector<int> inliers;
   ransac.getModelCoefficients(rough);
-  ransac.getInliers(inliers);
+  auto model = std::make_shared<pcl::SampleConsensusModelPlane<pcl::PointXYZ>>(points);
+  model->selectWithinDistance(rough, band, inliers);
+  if (static_cast<double>(inliers.size()) < min_share * static_cast<double>(points->size())) return std::nullopt;
   model->optimizeModelCoefficients(inliers, rough, fine);
   const Eigen::Vector3d normal = fine.head<3>().cast<double>();
   if (inliers.size() < 3 || std::abs(fine[3]) < 1e-6F) return std::nullopt;
@@ -146,7 +159,7 @@ std::optional<CloudSegmentation> segment_cloud(const Cloud& cloud, const CloudSe
   }
   if (readings->size() < 3) return std::nullopt;
   const double band = options.table_band * sigma / static_cast<double>(readings->size());
-  const std::optional<Table> table = cloud_table(readings, band);
+  const std::optional<Table> table = cloud_table(readings, band, options.min_share);
   if (!table) return std::nullopt;
 
   CloudSegmentation result{*table, std::vector<std::uint8_t>(cloud.size(), kLabelNothing)};

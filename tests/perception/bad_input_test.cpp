@@ -1,6 +1,5 @@
 // Images, cameras and clouds that make no sense, or are very large or very small: a clear result or a clear error, in
 // bounded time, from every stage between a depth image and a scene.
-#include <chrono>
 #include <cmath>
 #include <limits>
 
@@ -127,17 +126,13 @@ TEST(BadInput, ImagesOfOnePixelAndOfOneRow) {
   }
 }
 
+// The stages after these: tests/apps/place_odd_input_test.cpp.
 TEST(BadInput, TwelveMegapixels) {
   const Camera camera = scaled_camera(4096, 3072);
-  const auto start = std::chrono::steady_clock::now();
   const DepthImage depth = noisy_view(two_blocks(), camera, kView);
   const std::optional<Table> table = find_table(depth, camera);
   ASSERT_TRUE(table);
-  const LabelImage labels = segment(depth, camera, *table);
-  EXPECT_EQ(count_objects(labels), 2);
-  EXPECT_EQ(recover_unknown(depth, camera, *table, labels).size(), 2u);
-  // Not a figure: what is quadratic in the pixels would take hours.
-  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::minutes(5));
+  EXPECT_NEAR(table->T_world_camera.translation().z(), 0.45, 1e-3);
 }
 
 TEST(BadInput, ObjectsCutByTheImagesBorder) {
