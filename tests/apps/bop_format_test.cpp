@@ -463,7 +463,9 @@ class Dataset {
     }
     // Where objects touch or stand on the table two surfaces lie at one depth.
     EXPECT_LE(labels_off, kEdgePixels);
-    if (exact_depth_) EXPECT_LE(depths_off, kEdgePixels);
+    if (exact_depth_) {
+      EXPECT_LE(depths_off, kEdgePixels);
+    }
   }
 
   // Organised points as floats in metres in the camera's frame, NaN where the depth image has no reading.
