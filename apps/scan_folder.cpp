@@ -78,9 +78,10 @@ void ScanFolder::check_settings(const std::string& text) const {
   const std::string before = read_file(record_);
   if (before == text) return;
   const ordered_json old = ordered_json::parse(before, nullptr, false);
+  const ordered_json now = ordered_json::parse(text);
   std::string difference = "other settings";
   if (old.is_object()) {
-    for (const auto& [key, value] : ordered_json::parse(text).items()) {
+    for (const auto& [key, value] : now.items()) {
       const ordered_json was = old.value(key, ordered_json());
       if (was == value) continue;
       difference = key + " " + was.dump() + ", not " + value.dump();
