@@ -1,5 +1,6 @@
 #include "apps/scan_job.h"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstdio>
@@ -144,13 +145,20 @@ class Scans {
     return {job_.camera, sample_viewpoint(hand.centre, job_.view.viewpoint, rng)};
   }
 
+  bool is_behind_a_plane(const ScanView& view) const {
+    const Eigen::Vector3d eye = view.T_world_camera.translation();
+    return std::any_of(scenes_.T_world_plane.begin(), scenes_.T_world_plane.end(),
+                       [&](const Pose& T_world_plane) { return !((T_world_plane.inverse() * eye).z() > 0.0); });
+  }
+
   void scan(std::int64_t number, int image, SceneAtHand& hand) const {
     const auto k = static_cast<std::size_t>(number);
     const Scene& scene = scenes_.scenes[k];
     if (hand.number != number) take_up(number, hand);
     Rng rng = make_rng(job_.seed ^ kViewSeed, static_cast<std::uint64_t>(number * cameras_ + image));
     const ScanView from = view_of(image, hand, rng);
-    const std::string problem = viewpoint_problem(scene, from.T_world_camera, scenes_.table);
+    std::string problem = viewpoint_problem(scene, from.T_world_camera, scenes_.table);
+    if (is_behind_a_plane(from)) problem = "the camera is behind a plane";
     if (!problem.empty()) {
       throw UnusableScene("image " + std::to_string(image) + ": " + problem +
                           (scenes_.views.empty() ? "; choose another --distance or --seed" : ""));

@@ -69,6 +69,7 @@ ScanScenes scan_scenes_of_mjcf(const MjcfScanOptions& options, const Camera& cam
   const std::vector<SceneBody>& bodies = file.bodies();
   std::vector<TriangleMesh> meshes(bodies.size());  // of those that move, in their frames
   TriangleMesh surroundings;
+  ScanScenes result;
   for (const Geom& geom : file.geoms()) {
     if (!is_shown(geom)) continue;
     const auto body = static_cast<std::size_t>(geom.body);
@@ -76,9 +77,9 @@ ScanScenes scan_scenes_of_mjcf(const MjcfScanOptions& options, const Camera& cam
       append(tessellated(geom), geom.T_body_geom, meshes[body]);
     } else {
       append(tessellated(geom), poses[body] * geom.T_body_geom, surroundings);
+      if (geom.type == GeomType::kPlane) result.T_world_plane.push_back(poses[body] * geom.T_body_geom);
     }
   }
-  ScanScenes result;
   result.table = false;
   if (!surroundings.triangles.empty()) result.surroundings = drawn_object(kSurroundings, std::move(surroundings));
   Scene scene;

@@ -31,6 +31,7 @@ struct ScanScenes {
   bool table = true;                  // the plane z = 0 is there
   ObjectPtr surroundings;             // is there too, in the world's frame, and is no object; may be null
   std::vector<ScanView> views;        // of every scene; empty: they are sampled
+  std::vector<Pose> T_world_plane;    // planes z = 0 of the surroundings that no camera may be behind
 };
 
 // Throws UnusableScene, naming the scene, if it has more than 253 objects, the most that labels of 8 bits tell apart.

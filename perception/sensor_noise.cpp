@@ -158,6 +158,8 @@ SensorTerms published_kinect_terms() {
 
 DepthImage apply_sensor_noise(const Scan& scan, const Camera& camera, SensorModel sensor, double noise_scale,
                               Rng& rng) {
+  // An exact sensor has no term: nothing is looked at, whatever the scale.
+  if (sensor == SensorModel::kNone && noise_scale > 0.0) noise_scale = 0.0;
   return apply_sensor_noise(scan, camera, sensor_terms(sensor), noise_scale, rng);
 }
 

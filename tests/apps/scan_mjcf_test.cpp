@@ -107,6 +107,10 @@ TEST_F(ScanMjcf, WhatCannotBeScannedIsRefused) {
              "<mujoco><worldbody><camera name=\"in\"/><body name=\"b\"><freejoint/><geom size=\"0.1\"/></body>"
              "</worldbody></mujoco>");
   expect_refusal(scan({"--camera", "in"}), {"scene 0", "image 0", "inside object 0 (b)"});
+  write_file(file_,
+             "<mujoco><worldbody><geom type=\"plane\" size=\"0 0 1\"/><camera name=\"under\" pos=\"0 0 -1\"/>"
+             "<body name=\"b\" pos=\"0 0 0.1\"><freejoint/><geom size=\"0.1\"/></body></worldbody></mujoco>");
+  expect_refusal(scan({"--camera", "under"}), {"scene 0", "image 0", "behind a plane"});
   EXPECT_EQ(entries(directory_.path()), std::vector<std::string>{"shelf.xml"});
 }
 
