@@ -122,6 +122,7 @@ class UnusableScenes : public testing::Test {
  protected:
   void write_scenes(const std::vector<std::vector<Pose>>& scenes) const {
     SceneDataset dataset;
+    dataset.settings = "{}";
     dataset.shapes = {make_block("cube")};
     for (std::size_t k = 0; k < scenes.size(); ++k) {
       SceneRecord record;
