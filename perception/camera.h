@@ -30,10 +30,6 @@ inline Eigen::Vector2d project(const Camera& camera, const Eigen::Vector3d& p) {
 // throws std::invalid_argument if they coincide or the view is along z).
 Pose look_at(const Eigen::Vector3d& eye, const Eigen::Vector3d& target);
 
-// A camera with square pixels whose image is `fovy` radians high, the principal point in its middle. Throws
-// std::invalid_argument unless the angle lies between 0 and pi and the size is positive.
-Camera camera_of_fovy(double fovy, int width, int height);
-
 // BOP's camera.json: fx, fy, cx, cy, width, height, depth_scale. Throws InputError naming the file and the field
 // that is missing or wrong.
 Camera read_camera(const std::string& path);

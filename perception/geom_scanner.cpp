@@ -8,93 +8,14 @@
 #include <utility>
 
 #include "perception/embree_handles.h"
-#include "perception/geom_rays.h"
-#include "perception/pixel_grid.h"
+#include "perception/geom_primitives.h"
+#include "perception/tile_packet.h"
+#include "stability/parallel_for.h"
 
 namespace dofusion {
 namespace {
 
 using Eigen::Vector3d;
-
-// A packet's rays as they are before they are rounded to float; Embree hands its context on to our callbacks.
-struct ExactRays : RTCIntersectContext {
-  std::array<Vector3d, kPacket> origin, direction;  // by ray id; world
-};
-
-// What the callbacks of a geom with a formula need.
-struct Primitive {
-  GeomType type;
-  Vector3d size;
-  Eigen::Matrix3d R_geom_world;
-  Vector3d p_world;  // the geom's origin
-
-  std::optional<RayHit> hit(const Vector3d& origin_world, const Vector3d& direction_world) const {
-    return intersect(type, size, R_geom_world * (origin_world - p_world), R_geom_world * direction_world);
-  }
-};
-
-// Half the edges of the box around the geom in its own frame.
-Vector3d half_extent(GeomType type, const Vector3d& size) {
-  switch (type) {
-    case GeomType::kSphere:
-      return Vector3d::Constant(size.x());
-    case GeomType::kCapsule:
-      return {size.x(), size.x(), size.x() + size.y()};
-    case GeomType::kCylinder:
-      return {size.x(), size.x(), size.y()};
-    default:
-      return size;
-  }
-}
-
-void bound(const RTCBoundsFunctionArguments* arguments) {
-  const auto& primitive = *static_cast<const Primitive*>(arguments->geometryUserPtr);
-  const Vector3d half = primitive.R_geom_world.transpose().cwiseAbs() * half_extent(primitive.type, primitive.size);
-  // Rays reach us rounded to float: a little larger.
-  const Vector3d slack = 1e-5 * (half + primitive.p_world.cwiseAbs());
-  const Vector3d low = primitive.p_world - half - slack, high = primitive.p_world + half + slack;
-  RTCBounds& bounds = *arguments->bounds_o;
-  bounds.lower_x = static_cast<float>(low.x());
-  bounds.lower_y = static_cast<float>(low.y());
-  bounds.lower_z = static_cast<float>(low.z());
-  bounds.upper_x = static_cast<float>(high.x());
-  bounds.upper_y = static_cast<float>(high.y());
-  bounds.upper_z = static_cast<float>(high.z());
-}
-
-void intersect_packet(const RTCIntersectFunctionNArguments* arguments) {
-  const auto& primitive = *static_cast<const Primitive*>(arguments->geometryUserPtr);
-  const auto& rays = *static_cast<const ExactRays*>(arguments->context);
-  RTCRayN* ray = RTCRayHitN_RayN(arguments->rayhit, arguments->N);
-  RTCHitN* hit = RTCRayHitN_HitN(arguments->rayhit, arguments->N);
-  for (unsigned i = 0; i < arguments->N; ++i) {
-    if (arguments->valid[i] == 0) continue;
-    const unsigned id = RTCRayN_id(ray, arguments->N, i);
-    const auto found = primitive.hit(rays.origin[id], rays.direction[id]);
-    if (!found || !(static_cast<float>(found->along) < RTCRayN_tfar(ray, arguments->N, i))) continue;
-    RTCRayN_tfar(ray, arguments->N, i) = static_cast<float>(found->along);
-    const Eigen::Vector3f normal = (primitive.R_geom_world.transpose() * found->normal).cast<float>();
-    RTCHitN_Ng_x(hit, arguments->N, i) = normal.x();
-    RTCHitN_Ng_y(hit, arguments->N, i) = normal.y();
-    RTCHitN_Ng_z(hit, arguments->N, i) = normal.z();
-    RTCHitN_geomID(hit, arguments->N, i) = arguments->geomID;
-    RTCHitN_primID(hit, arguments->N, i) = 0;
-    RTCHitN_instID(hit, arguments->N, i, 0) = RTC_INVALID_GEOMETRY_ID;
-  }
-}
-
-void occlude_packet(const RTCOccludedFunctionNArguments* arguments) {
-  const auto& primitive = *static_cast<const Primitive*>(arguments->geometryUserPtr);
-  RTCRayN* ray = arguments->ray;
-  const unsigned n = arguments->N;
-  for (unsigned i = 0; i < n; ++i) {
-    if (arguments->valid[i] == 0) continue;
-    const Vector3d origin(RTCRayN_org_x(ray, n, i), RTCRayN_org_y(ray, n, i), RTCRayN_org_z(ray, n, i));
-    const Vector3d direction(RTCRayN_dir_x(ray, n, i), RTCRayN_dir_y(ray, n, i), RTCRayN_dir_z(ray, n, i));
-    const auto found = primitive.hit(origin, direction);
-    if (found && found->along <= RTCRayN_tfar(ray, n, i)) RTCRayN_tfar(ray, n, i) = -kInfinity;
-  }
-}
 
 // Of a mesh's triangle in the geom's frame.
 struct TrianglePlane {
@@ -162,17 +83,6 @@ struct GeomScanner::Impl {
     rtcSetGeometryTimeStepCount(geometries[geom].get(), 1);
   }
 
-  void add_primitive(std::size_t geom) {
-    geometries[geom].reset(rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_USER));
-    RTCGeometry geometry = geometries[geom].get();
-    rtcSetGeometryUserPrimitiveCount(geometry, 1);
-    rtcSetGeometryUserData(geometry, &primitives[geom]);
-    rtcSetGeometryBoundsFunction(
-        geometry, [](const RTCBoundsFunctionArguments* arguments) { bound(arguments); }, nullptr);
-    rtcSetGeometryIntersectFunction(geometry, intersect_packet);
-    rtcSetGeometryOccludedFunction(geometry, occlude_packet);
-  }
-
   void update_visibility() {
     for (std::size_t i = 0; i < geoms.size(); ++i) {
       if (!geometries[i]) continue;
@@ -224,7 +134,44 @@ struct GeomScanner::Impl {
     }
     return hit;
   }
+
+  // The nearer of what Embree found, if it found anything, and the planes.
+  std::optional<ExactHit> nearest(const RTCRayHit16& packet, int k, const ExactRays& rays) const {
+    const auto ray = static_cast<std::size_t>(k);
+    std::optional<ExactHit> hit = plane_hit(rays.origin[ray], rays.direction[ray]);
+    if (packet.hit.geomID[k] == RTC_INVALID_GEOMETRY_ID) return hit;
+    const ExactHit found =
+        embree_hit(packet.hit.geomID[k], packet.hit.instID[0][k], packet.hit.primID[k], packet.ray.tfar[k],
+                   {packet.hit.Ng_x[k], packet.hit.Ng_y[k], packet.hit.Ng_z[k]}, rays.origin[ray], rays.direction[ray]);
+    return hit && hit->along <= found.along ? hit : found;
+  }
 };
+
+// Casts the packet's valid rays. (Planes are laid over what they hit, not used to shorten them: see Scanner::occluded.)
+void cast_packet(RTCScene world, const int* valid, ExactRays& rays, bool coherent, RTCRayHit16& packet) {
+  rtcInitIntersectContext(&rays);
+  if (coherent) rays.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  for (int k = 0; k < kPacket; ++k) {
+    const auto ray = static_cast<std::size_t>(k);
+    const Eigen::Vector3f origin = rays.origin[ray].cast<float>(), direction = rays.direction[ray].cast<float>();
+    packet.ray.org_x[k] = origin.x();
+    packet.ray.org_y[k] = origin.y();
+    packet.ray.org_z[k] = origin.z();
+    packet.ray.dir_x[k] = direction.x();
+    packet.ray.dir_y[k] = direction.y();
+    packet.ray.dir_z[k] = direction.z();
+    packet.ray.tnear[k] = 0.0f;
+    packet.ray.tfar[k] = kInfinity;
+    packet.ray.time[k] = 0.0f;
+    packet.ray.mask[k] = kHitEverything;
+    packet.ray.id[k] = static_cast<unsigned>(k);
+    packet.ray.flags[k] = 0;
+    packet.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
+    packet.hit.primID[k] = RTC_INVALID_GEOMETRY_ID;
+    packet.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
+  }
+  rtcIntersect16(valid, world, &rays, &packet);
+}
 
 GeomScanner::GeomScanner(std::vector<Geom> geoms, const GeomScannerOptions& options) : impl_(std::make_unique<Impl>()) {
   for (const Geom& geom : geoms) check_geom(geom);
@@ -255,7 +202,7 @@ GeomScanner::GeomScanner(std::vector<Geom> geoms, const GeomScannerOptions& opti
     if (geom.type == GeomType::kMesh || geom.type == GeomType::kHeightField) {
       impl.add_mesh(i, known);
     } else {
-      impl.add_primitive(i);
+      impl.geometries[i] = make_primitive(impl.device.get(), &impl.primitives[i]);
     }
     rtcAttachGeometryByID(impl.world.get(), impl.geometries[i].get(), static_cast<unsigned>(i));
   }
@@ -307,42 +254,40 @@ void GeomScanner::set_visible(int geom, bool visible) {
 }
 
 GeomScan GeomScanner::render(const Camera& camera, const Pose& T_world_camera, int threads) const {
-  check_camera(camera);
+  if (camera.width <= 0 || camera.height <= 0 || !(camera.fx > 0.0) || !(camera.fy > 0.0))
+    throw std::invalid_argument("a camera needs a positive size and focal length");
   Impl& impl = *impl_;
   impl.commit();
   GeomScan scan{DepthImage(camera.width, camera.height), IdImage(camera.width, camera.height, -1),
                 IdImage(camera.width, camera.height, -1),
                 NormalImage(camera.width, camera.height, Eigen::Vector3f::Zero())};
-  const PixelGrid grid(camera, T_world_camera, 0, 0, camera.width, camera.height, 1);
-  const Eigen::Matrix3d R_camera_world = T_world_camera.linear().transpose();
-  for_each_tile(grid, threads, [&](int row0, int column0, RTCRayHit16& packet, int* valid) {
+  const Eigen::Matrix3d R_world_camera = T_world_camera.linear();
+  const auto render_tile = [&](int row0, int column0) {
     ExactRays rays;
-    rtcInitIntersectContext(&rays);
-    rays.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-    std::array<std::optional<ExactHit>, kPacket> nearest;
+    RTCRayHit16 packet;
+    alignas(64) int valid[kPacket];
     for (int k = 0; k < kPacket; ++k) {
-      const auto ray = static_cast<std::size_t>(k);
-      rays.origin[ray] = grid.exact_origin;
-      rays.direction[ray] = grid.exact_direction(row0 + k / kTile, column0 + k % kTile);
-      nearest[ray] = impl.plane_hit(rays.origin[ray], rays.direction[ray]);
-      if (nearest[ray]) packet.ray.tfar[k] = static_cast<float>(nearest[ray]->along);
+      const int row = row0 + k / kTile, column = column0 + k % kTile;
+      valid[k] = row < camera.height && column < camera.width ? -1 : 0;
+      rays.origin[static_cast<std::size_t>(k)] = T_world_camera.translation();
+      // Of length 1 along the optical axis, so that how far along the ray is the z-depth.
+      rays.direction[static_cast<std::size_t>(k)] = R_world_camera * unproject(camera, column, row, 1.0);
     }
-    rtcIntersect16(valid, impl.world.get(), &rays, &packet);
+    cast_packet(impl.world.get(), valid, rays, true, packet);
     for (int k = 0; k < kPacket; ++k) {
       if (valid[k] == 0) continue;
-      const auto ray = static_cast<std::size_t>(k);
-      if (packet.hit.geomID[k] != RTC_INVALID_GEOMETRY_ID) {
-        nearest[ray] =
-            impl.embree_hit(packet.hit.geomID[k], packet.hit.instID[0][k], packet.hit.primID[k], packet.ray.tfar[k],
-                            Vector3d(packet.hit.Ng_x[k], packet.hit.Ng_y[k], packet.hit.Ng_z[k]), rays.origin[ray],
-                            rays.direction[ray]);
-      }
-      if (!nearest[ray]) continue;
+      const std::optional<ExactHit> hit = impl.nearest(packet, k, rays);
+      if (!hit) continue;
       const int row = row0 + k / kTile, column = column0 + k % kTile;
-      scan.depth.at(row, column) = static_cast<float>(nearest[ray]->along);
-      scan.geoms.at(row, column) = nearest[ray]->geom;
-      scan.bodies.at(row, column) = impl.geoms[static_cast<std::size_t>(nearest[ray]->geom)].body;
-      scan.normals.at(row, column) = (R_camera_world * nearest[ray]->normal_world).cast<float>();
+      scan.depth.at(row, column) = static_cast<float>(hit->along);
+      scan.geoms.at(row, column) = hit->geom;
+      scan.bodies.at(row, column) = impl.geoms[static_cast<std::size_t>(hit->geom)].body;
+      scan.normals.at(row, column) = (R_world_camera.transpose() * hit->normal_world).cast<float>();
+    }
+  };
+  parallel_for((camera.height + kTile - 1) / kTile, threads, [&](std::int64_t tile_row, int) {
+    for (int column0 = 0; column0 < camera.width; column0 += kTile) {
+      render_tile(static_cast<int>(tile_row) * kTile, column0);
     }
   });
   return scan;
@@ -352,47 +297,66 @@ std::optional<GeomScanner::Hit> GeomScanner::cast_ray(const Vector3d& origin_wor
                                                       const Vector3d& direction_world) const {
   const double length = direction_world.norm();
   if (!(length > 0.0) || !std::isfinite(length)) throw std::invalid_argument("a ray needs a direction");
-  Impl& impl = *impl_;
-  impl.commit();
+  impl_->commit();
   ExactRays rays;
-  rtcInitIntersectContext(&rays);
-  const Vector3d direction = direction_world / length;
-  rays.origin[0] = origin_world;
-  rays.direction[0] = direction;
-  std::optional<ExactHit> nearest = impl.plane_hit(origin_world, direction);
-  RTCRayHit ray{};
-  ray.ray.org_x = static_cast<float>(origin_world.x());
-  ray.ray.org_y = static_cast<float>(origin_world.y());
-  ray.ray.org_z = static_cast<float>(origin_world.z());
-  ray.ray.dir_x = static_cast<float>(direction.x());
-  ray.ray.dir_y = static_cast<float>(direction.y());
-  ray.ray.dir_z = static_cast<float>(direction.z());
-  ray.ray.tfar = nearest ? static_cast<float>(nearest->along) : kInfinity;
-  ray.ray.mask = kHitEverything;
-  ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  rtcIntersect1(impl.world.get(), &rays, &ray);
-  if (ray.hit.geomID != RTC_INVALID_GEOMETRY_ID) {
-    nearest = impl.embree_hit(ray.hit.geomID, ray.hit.instID[0], ray.hit.primID, ray.ray.tfar,
-                              Vector3d(ray.hit.Ng_x, ray.hit.Ng_y, ray.hit.Ng_z), origin_world, direction);
-  }
-  if (!nearest) return std::nullopt;
-  return Hit{nearest->along, nearest->geom, impl.geoms[static_cast<std::size_t>(nearest->geom)].body,
-             nearest->normal_world};
+  rays.origin.fill(origin_world);
+  rays.direction.fill(direction_world / length);
+  RTCRayHit16 packet;
+  alignas(64) int valid[kPacket] = {-1};
+  cast_packet(impl_->world.get(), valid, rays, false, packet);
+  const std::optional<ExactHit> hit = impl_->nearest(packet, 0, rays);
+  if (!hit) return std::nullopt;
+  return Hit{hit->along, hit->geom, impl_->geoms[static_cast<std::size_t>(hit->geom)].body, hit->normal_world};
 }
 
 std::vector<std::uint8_t> GeomScanner::occluded(const std::vector<Scanner::Segment>& segments) const {
   Impl& impl = *impl_;
   impl.commit();
-  std::vector<std::uint8_t> result = occluded_segments(impl.world.get(), segments);
-  if (impl.planes.empty()) return result;
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);  // not marked coherent: see Scanner::occluded
+  std::vector<std::uint8_t> result(segments.size());
   for (std::size_t i = 0; i < segments.size(); ++i) {
-    if (result[i] != 0) continue;
-    const Vector3d from = segments[i].from.cast<double>();
-    const auto hit = impl.plane_hit(from, segments[i].to.cast<double>() - from);
-    if (hit && hit->along <= 1.0) result[i] = 1;
+    const Eigen::Vector3f from = segments[i].from, along = segments[i].to - from;
+    RTCRay ray{};
+    ray.org_x = from.x();
+    ray.org_y = from.y();
+    ray.org_z = from.z();
+    ray.dir_x = along.x();
+    ray.dir_y = along.y();
+    ray.dir_z = along.z();
+    ray.tfar = 1.0f;
+    ray.mask = kHitEverything;
+    rtcOccluded1(impl.world.get(), &context, &ray);
+    const auto plane = impl.plane_hit(from.cast<double>(), along.cast<double>());
+    result[i] = ray.tfar < 0.0f || (plane && plane->along <= 1.0) ? 1 : 0;  // Embree: -infinity if occluded
   }
   return result;
+}
+
+AngleImage incidence_angles(const NormalImage& normals, const Camera& camera) {
+  AngleImage angles(normals.width, normals.height);
+  for (int row = 0; row < normals.height; ++row) {
+    for (int column = 0; column < normals.width; ++column) {
+      const Vector3d normal = normals.at(row, column).cast<double>();
+      if (normal.isZero()) continue;
+      const Vector3d back = -unproject(camera, column, row, 1.0);
+      angles.at(row, column) = static_cast<float>(std::atan2(normal.cross(back).norm(), normal.dot(back)));
+    }
+  }
+  return angles;
+}
+
+Camera camera_of_fovy(double fovy, int width, int height) {
+  if (!(fovy > 0.0 && fovy < M_PI) || width <= 0 || height <= 0)
+    throw std::invalid_argument("no camera has a field of view of " + std::to_string(fovy) + " radians and " +
+                                std::to_string(width) + "x" + std::to_string(height) + " pixels");
+  Camera camera;
+  camera.fx = camera.fy = 0.5 * height / std::tan(0.5 * fovy);
+  camera.cx = 0.5 * (width - 1);  // pixel centres are at integers
+  camera.cy = 0.5 * (height - 1);
+  camera.width = width;
+  camera.height = height;
+  return camera;
 }
 
 Scan labelled(const GeomScan& scan, const std::vector<std::uint8_t>& label_of_body) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -12,6 +13,9 @@
 #include "stability/geom.h"
 
 namespace dofusion {
+
+using IdImage = Image<std::int32_t>;  // indices; -1 nothing
+using AngleImage = Image<float>;      // radians
 
 struct GeomScan {
   DepthImage depth;     // z-depth, metres, exact; 0 where nothing is hit
@@ -72,5 +76,13 @@ class GeomScanner {
 // The scan with 8-bit labels: of body i label_of_body[i], kLabelNothing where nothing is seen. Throws
 // std::invalid_argument if a body that is seen has none.
 Scan labelled(const GeomScan& scan, const std::vector<std::uint8_t>& label_of_body);
+
+// The angle between the surface's normal and the direction to the camera at every pixel, in [0, pi]; above pi / 2 a
+// surface is seen from behind. 0 where the normal is zero: nothing is seen.
+AngleImage incidence_angles(const NormalImage& normals, const Camera& camera);
+
+// A camera with square pixels whose image is `fovy` radians high (SceneCamera::fovy), the principal point in its
+// middle. Throws std::invalid_argument unless the angle lies between 0 and pi and the size is positive.
+Camera camera_of_fovy(double fovy, int width, int height);
 
 }  // namespace dofusion

@@ -3,16 +3,22 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <string>
 
 #include "perception/embree_handles.h"
-#include "perception/pixel_grid.h"
 
 namespace dofusion {
 namespace {
 
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr int kPacket = 16;  // rays, as 4 x 4 neighbouring pixels
+constexpr int kTile = 4;
 constexpr int kMaxObjects = 255 - kLabelFirstObject;
+
+// Debian's Embree honours ray masks: a ray with mask 0 hits nothing.
+constexpr unsigned kHitEverything = 0xFFFFFFFFu;
 
 TriangleMesh table_mesh(double half_size) {
   const double h = half_size;
@@ -29,17 +35,56 @@ std::vector<Eigen::Vector3d> triangle_normals(const TriangleMesh& mesh) {
   return normals;
 }
 
-// Triangles' normals in a camera's frame.
-struct NormalTable {
-  Eigen::Vector3f table;
-  std::vector<Eigen::Matrix3d> R_camera_object;  // per object
-  const std::vector<std::vector<Eigen::Vector3d>>& normals;
-
-  Eigen::Vector3f of(unsigned instance, unsigned triangle) const {
-    if (instance == RTC_INVALID_GEOMETRY_ID) return table;
-    return (R_camera_object[instance] * normals[instance][triangle]).cast<float>();
+// The rays of a window of pixels. A ray's direction has length 1 along the optical axis, so that Embree's ray
+// parameter is the z-depth itself.
+struct PixelGrid {
+  PixelGrid(const Camera& camera, const Pose& T_world_camera, int u0_, int v0_, int u1, int v1, int stride_)
+      : u0(u0_),
+        v0(v0_),
+        stride(stride_),
+        columns((u1 - u0_ + stride_ - 1) / stride_),
+        rows((v1 - v0_ + stride_ - 1) / stride_) {
+    const Eigen::Matrix3d R = T_world_camera.linear();
+    origin = T_world_camera.translation().cast<float>();
+    corner = (R * Eigen::Vector3d((u0 - camera.cx) / camera.fx, (v0 - camera.cy) / camera.fy, 1.0)).cast<float>();
+    right = (R.col(0) * (stride / camera.fx)).cast<float>();
+    down = (R.col(1) * (stride / camera.fy)).cast<float>();
   }
+  Eigen::Vector3f direction(int row, int column) const {
+    return corner + static_cast<float>(column) * right + static_cast<float>(row) * down;
+  }
+  int u0, v0, stride, columns, rows;
+  Eigen::Vector3f origin, corner, right, down;
 };
+
+// What all packets of a window have in common.
+void start_packet(const PixelGrid& grid, RTCRayHit16& packet) {
+  for (int k = 0; k < kPacket; ++k) {
+    packet.ray.org_x[k] = grid.origin.x();
+    packet.ray.org_y[k] = grid.origin.y();
+    packet.ray.org_z[k] = grid.origin.z();
+    packet.ray.tnear[k] = 0.0f;
+    packet.ray.time[k] = 0.0f;
+    packet.ray.mask[k] = kHitEverything;
+    packet.ray.flags[k] = 0;
+  }
+}
+
+// The 4 x 4 rays of the tile whose first pixel is (row0, column0); rays beyond the window are marked invalid.
+void fill_packet(const PixelGrid& grid, int row0, int column0, RTCRayHit16& packet, int* valid) {
+  const Eigen::Vector3f d = grid.direction(row0, column0);
+  for (int k = 0; k < kPacket; ++k) {
+    const int row = k / kTile, column = k % kTile;
+    const float r = static_cast<float>(row), c = static_cast<float>(column);
+    valid[k] = row0 + row < grid.rows && column0 + column < grid.columns ? -1 : 0;
+    packet.ray.dir_x[k] = d.x() + c * grid.right.x() + r * grid.down.x();
+    packet.ray.dir_y[k] = d.y() + c * grid.right.y() + r * grid.down.y();
+    packet.ray.dir_z[k] = d.z() + c * grid.right.z() + r * grid.down.z();
+    packet.ray.tfar[k] = kInfinity;
+    packet.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
+    packet.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
+  }
+}
 
 }  // namespace
 
@@ -64,12 +109,6 @@ struct Scanner::Impl {
   // Embree's geometry ids: an object's hit carries its instance, the table's none.
   int object_of(unsigned instance) const {
     return instance == RTC_INVALID_GEOMETRY_ID ? -1 : static_cast<int>(instance);
-  }
-  NormalTable normals_in(const Pose& T_world_camera) const {
-    const Eigen::Matrix3d R_camera_world = T_world_camera.linear().transpose();
-    NormalTable result{R_camera_world.col(2).cast<float>(), {}, normals};
-    for (const Eigen::Matrix3d& R : R_world_object) result.R_camera_object.push_back(R_camera_world * R);
-    return result;
   }
   Eigen::Vector3d normal_world(int object, unsigned triangle) const {
     if (object < 0) return Eigen::Vector3d::UnitZ();
@@ -143,6 +182,8 @@ void Scanner::set_visible(int object, bool visible) {
   impl_->changed = true;
 }
 
+namespace {
+
 void check_camera(const Camera& camera) {
   if (camera.width <= 0 || camera.height <= 0 || !(camera.fx > 0.0) || !(camera.fy > 0.0))
     throw std::invalid_argument("a camera needs a positive size and focal length, not " + std::to_string(camera.width) +
@@ -150,69 +191,43 @@ void check_camera(const Camera& camera) {
                                 std::to_string(camera.fy));
 }
 
-namespace {
+}  // namespace
 
-// Casts a tile's rays, which are in `packet`.
-void cast_tile(RTCScene world, RTCRayHit16& packet, const int* valid) {
+// Casts the grid's rays in packets and hands each hit to found(pixel, depth, instance, triangle).
+template <class Found>
+void cast_grid(RTCScene world, const PixelGrid& grid, const Found& found) {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  rtcIntersect16(valid, world, &context, &packet);
+  RTCRayHit16 packet;
+  alignas(64) int valid[kPacket];
+  start_packet(grid, packet);
+  for (int row0 = 0; row0 < grid.rows; row0 += kTile)
+    for (int column0 = 0; column0 < grid.columns; column0 += kTile) {
+      fill_packet(grid, row0, column0, packet, valid);
+      rtcIntersect16(valid, world, &context, &packet);
+      for (int k = 0; k < kPacket; ++k)
+        if (valid[k] && packet.hit.geomID[k] != RTC_INVALID_GEOMETRY_ID)
+          found(static_cast<std::size_t>(row0 + k / kTile) * grid.columns + column0 + k % kTile, packet.ray.tfar[k],
+                packet.hit.instID[0][k], packet.hit.primID[k]);
+    }
 }
 
-std::uint8_t label_of(unsigned instance) {
-  return instance == RTC_INVALID_GEOMETRY_ID ? kLabelTable : static_cast<std::uint8_t>(kLabelFirstObject + instance);
-}
-
-}  // namespace
-
-Scan Scanner::render(const Camera& camera, const Pose& T_world_camera, int threads) const {
-  Scan scan;
-  render(camera, T_world_camera, threads, scan);
-  return scan;
-}
-
-void Scanner::render(const Camera& camera, const Pose& T_world_camera, int threads, Scan& scan) const {
+Scan Scanner::render(const Camera& camera, const Pose& T_world_camera) const {
   check_camera(camera);
   Impl& impl = *impl_;
   impl.commit();
-  if (scan.depth.width != camera.width || scan.depth.height != camera.height) {
-    scan = {DepthImage(camera.width, camera.height), LabelImage(camera.width, camera.height),
+  Scan scan{DepthImage(camera.width, camera.height), LabelImage(camera.width, camera.height),
             NormalImage(camera.width, camera.height, Eigen::Vector3f::Zero())};
-  }
   const PixelGrid grid(camera, T_world_camera, 0, 0, camera.width, camera.height, 1);
-  const NormalTable normals = impl.normals_in(T_world_camera);
-  for_each_tile(grid, threads, [&](int row0, int column0, RTCRayHit16& packet, const int* valid) {
-    cast_tile(impl.world.get(), packet, valid);
-    unsigned last_instance = RTC_INVALID_GEOMETRY_ID, last_triangle = RTC_INVALID_GEOMETRY_ID;
-    Eigen::Vector3f normal = normals.table;
-    const int tile_rows = std::min(kTile, grid.rows - row0), tile_columns = std::min(kTile, grid.columns - column0);
-    for (int row = 0; row < tile_rows; ++row) {
-      const std::size_t first = static_cast<std::size_t>(row0 + row) * grid.columns + column0;
-      float* depth = &scan.depth.pixels[first];
-      std::uint8_t* label = &scan.labels.pixels[first];
-      Eigen::Vector3f* out = &scan.normals.pixels[first];
-      for (int column = 0; column < tile_columns; ++column) {
-        const int k = kTile * row + column;
-        if (packet.hit.geomID[k] == RTC_INVALID_GEOMETRY_ID) {
-          depth[column] = 0.0f;
-          label[column] = kLabelNothing;
-          out[column].setZero();
-          continue;
-        }
-        // Neighbours mostly share a triangle.
-        const unsigned instance = packet.hit.instID[0][k], triangle = packet.hit.primID[k];
-        if (instance != last_instance || triangle != last_triangle) {
-          normal = normals.of(instance, triangle);
-          last_instance = instance;
-          last_triangle = triangle;
-        }
-        depth[column] = packet.ray.tfar[k];
-        label[column] = label_of(instance);
-        out[column] = normal;
-      }
-    }
+  const Eigen::Matrix3d R_camera_world = T_world_camera.linear().transpose();
+  cast_grid(impl.world.get(), grid, [&](std::size_t pixel, float depth, unsigned instance, unsigned triangle) {
+    const int object = impl.object_of(instance);
+    scan.depth.pixels[pixel] = depth;
+    scan.labels.pixels[pixel] = object < 0 ? kLabelTable : static_cast<std::uint8_t>(kLabelFirstObject + object);
+    scan.normals.pixels[pixel] = (R_camera_world * impl.normal_world(object, triangle)).cast<float>();
   });
+  return scan;
 }
 
 Scan Scanner::render_window(const Camera& camera, const Pose& T_world_camera, int u0, int v0, int u1, int v1,
@@ -226,14 +241,10 @@ Scan Scanner::render_window(const Camera& camera, const Pose& T_world_camera, in
   impl.commit();
   const PixelGrid grid(camera, T_world_camera, u0, v0, u1, v1, stride);
   Scan scan{DepthImage(grid.columns, grid.rows), LabelImage(grid.columns, grid.rows), NormalImage()};
-  for_each_tile(grid, 1, [&](int row0, int column0, RTCRayHit16& packet, const int* valid) {
-    cast_tile(impl.world.get(), packet, valid);
-    for (int k = 0; k < kPacket; ++k) {
-      if (valid[k] == 0 || packet.hit.geomID[k] == RTC_INVALID_GEOMETRY_ID) continue;
-      const int row = row0 + k / kTile, column = column0 + k % kTile;
-      scan.depth.at(row, column) = packet.ray.tfar[k];
-      scan.labels.at(row, column) = label_of(packet.hit.instID[0][k]);
-    }
+  cast_grid(impl.world.get(), grid, [&](std::size_t pixel, float depth, unsigned instance, unsigned) {
+    const int object = impl.object_of(instance);
+    scan.depth.pixels[pixel] = depth;
+    scan.labels.pixels[pixel] = object < 0 ? kLabelTable : static_cast<std::uint8_t>(kLabelFirstObject + object);
   });
   return scan;
 }
@@ -263,7 +274,8 @@ std::optional<Scanner::Hit> Scanner::cast_ray(const Eigen::Vector3d& origin_worl
   return Hit{ray.ray.tfar, object, impl.normal_world(object, ray.hit.primID)};
 }
 
-std::vector<std::uint8_t> occluded_segments(RTCScene world, const std::vector<Scanner::Segment>& segments) {
+std::vector<std::uint8_t> Scanner::occluded(const std::vector<Segment>& segments) const {
+  impl_->commit();
   RTCIntersectContext context;
   // Not marked coherent: Embree 3.13.5's coherent rtcOccluded16 was seen never to return from a packet of finite,
   // nearly parallel rays. Its rtcIntersect16, which `render` uses, returned from 50 million random packets.
@@ -274,7 +286,7 @@ std::vector<std::uint8_t> occluded_segments(RTCScene world, const std::vector<Sc
   for (std::size_t first = 0; first < segments.size(); first += kPacket) {
     for (std::size_t k = 0; k < kPacket; ++k) {
       valid[k] = first + k < segments.size() ? -1 : 0;
-      const Scanner::Segment& segment = segments[std::min(first + k, segments.size() - 1)];
+      const Segment& segment = segments[std::min(first + k, segments.size() - 1)];
       packet.org_x[k] = segment.from.x();
       packet.org_y[k] = segment.from.y();
       packet.org_z[k] = segment.from.z();
@@ -287,29 +299,11 @@ std::vector<std::uint8_t> occluded_segments(RTCScene world, const std::vector<Sc
       packet.mask[k] = kHitEverything;
       packet.flags[k] = 0;
     }
-    rtcOccluded16(valid, world, &context, &packet);
+    rtcOccluded16(valid, impl_->world.get(), &context, &packet);
     for (std::size_t k = 0; k < kPacket && first + k < segments.size(); ++k)
       result[first + k] = packet.tfar[k] < 0.0f ? 1 : 0;  // Embree marks an occluded ray with -infinity
   }
   return result;
-}
-
-std::vector<std::uint8_t> Scanner::occluded(const std::vector<Segment>& segments) const {
-  impl_->commit();
-  return occluded_segments(impl_->world.get(), segments);
-}
-
-AngleImage incidence_angles(const NormalImage& normals, const Camera& camera) {
-  AngleImage angles(normals.width, normals.height);
-  for (int row = 0; row < normals.height; ++row) {
-    for (int column = 0; column < normals.width; ++column) {
-      const Eigen::Vector3d normal = normals.at(row, column).cast<double>();
-      if (normal.isZero()) continue;
-      const Eigen::Vector3d back = -unproject(camera, column, row, 1.0);
-      angles.at(row, column) = static_cast<float>(std::atan2(normal.cross(back).norm(), normal.dot(back)));
-    }
-  }
-  return angles;
 }
 
 }  // namespace dofusion

@@ -37,10 +37,7 @@ class Scanner {
   // Hides (false) or shows (true) object i.
   void set_visible(int object, bool visible);
 
-  // The same scan for any number of threads.
-  Scan render(const Camera& camera, const Pose& T_world_camera, int threads = 1) const;
-  // Into a scan of this size if there is one, so that a loop over views allocates nothing.
-  void render(const Camera& camera, const Pose& T_world_camera, int threads, Scan& scan) const;
+  Scan render(const Camera& camera, const Pose& T_world_camera) const;
 
   // Depth and labels inside the pixel rectangle [u0, u1) x [v0, v1) alone, at every `stride`-th pixel, for render
   // and compare; the images have ceil(size / stride) pixels.
@@ -64,9 +61,5 @@ class Scanner {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
-
-// The angle between the surface's normal and the direction to the camera at every pixel, in [0, pi]; above pi / 2 a
-// surface is seen from behind. 0 where the normal is zero: nothing is seen.
-AngleImage incidence_angles(const NormalImage& normals, const Camera& camera);
 
 }  // namespace dofusion
