@@ -105,8 +105,8 @@ void compare(const std::string& path, const Vector3d& centre, double near, doubl
   }
   EXPECT_GT(hits, count / 20) << path;
   EXPECT_LE(edges, count / 500) << path;
-  RecordProperty("hits", hits);
-  RecordProperty("edges", edges);
+  testing::Test::RecordProperty("hits", hits);
+  testing::Test::RecordProperty("edges", edges);
 }
 
 TEST(GeomTruth, FormulasAreMujocosInsideAndOutside) {

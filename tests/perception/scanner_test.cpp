@@ -1,6 +1,7 @@
 #include "perception/scanner.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include <gmock/gmock.h>
@@ -53,6 +54,22 @@ TEST(Scanner, TableEndsAndIsOptional) {
   EXPECT_EQ(small.normals.at(80, 100 + 51), Eigen::Vector3f::Zero());
   options.table = false;
   EXPECT_EQ(count(Scanner({}, options).render(kCamera, overhead()).labels, kLabelNothing), 201 * 161);
+}
+
+TEST(Scanner, TableIsSeenFromBelowAndNotFromWithin) {
+  const Scanner scanner({});
+  const Camera camera{100.0, 100.0, 2.0, 2.0, 5, 5, 1.0};
+  const Pose below = make_pose(Eigen::Matrix3d::Identity(), {0.1, 0.2, -0.7});  // looks up
+  EXPECT_NEAR(scanner.render(camera, below).depth.at(2, 2), 0.7, kFloatTolerance);
+  EXPECT_EQ(scanner.render(camera, below).labels.at(2, 2), kLabelTable);
+  // Along z = 0, in it and a hair above it: the middle row's rays never meet it.
+  for (const double height : {0.0, 1e-3}) {
+    const Pose level = look_at({0.5, 0, height}, {0, 0, height});
+    const Scan scan = scanner.render(camera, level);
+    for (const float depth : scan.depth.pixels) EXPECT_TRUE(std::isfinite(depth));
+    EXPECT_EQ(scan.labels.at(2, 2), kLabelNothing) << height;
+    EXPECT_FALSE(scanner.cast_ray({0.5, 0, height}, {-1, 0, 0}));
+  }
 }
 
 TEST(Scanner, BoxEdgesAreAtTheirPixels) {
