@@ -34,6 +34,7 @@ struct GeomScannerOptions {
 // found by Embree in float, the depth on the triangle that was found is worked out in double. All agrees with MuJoCo's
 // mj_ray to 1e-5 m but for rays that pass within about 1e-6 m (times the distance in metres) of a silhouette or an
 // edge, which may hit or miss, and except:
+//   - mj_ray (2.2.2) puts wrong upper edges on the two walls of a height field at x = +-half;
 //   - from inside a height field mj_ray also sees the top of its base box, here only its outer surface is there;
 //   - mj_ray shows planes and height fields whatever their group, here groups count for them as for others;
 //   - what has alpha 0 is hidden, by the colour that a geom is drawn with; mj_ray takes its material's, if it has one.
