@@ -70,6 +70,23 @@ std::vector<Instance> make_instances(const InstanceOptions& options) {
   return instances;
 }
 
+std::vector<Instance> instances_of(const std::vector<SceneDataset>& datasets, int count, std::uint64_t seed) {
+  std::vector<std::pair<const SceneDataset*, const SceneRecord*>> scenes;
+  for (const SceneDataset& dataset : datasets)
+    for (const SceneRecord& record : dataset.scenes) scenes.emplace_back(&dataset, &record);
+  const std::size_t all = scenes.size(), wanted = std::min(all, static_cast<std::size_t>(count));
+  std::vector<Instance> instances;
+  SimulatorCache simulators;
+  for (std::size_t i = 0; i < wanted; ++i) {
+    const auto& [dataset, record] = scenes[i * all / wanted];
+    Rng rng = make_rng(seed ^ 0x696e7374u, i);
+    const int last = static_cast<int>(record->objects.size()) - 1;
+    const int query = record->task == Task::kStack ? last : uniform_int(rng, 0, last);
+    instances.push_back(take_away(to_scene(*dataset, *record), query, record->task, simulators));
+  }
+  return instances;
+}
+
 std::vector<Outcome> settle_placements(const std::vector<Instance>& instances, const std::vector<Pose>& T_world_query,
                                        int threads, const PhysicsOptions& physics) {
   if (T_world_query.size() != instances.size()) throw std::invalid_argument("one pose per instance is needed");

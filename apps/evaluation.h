@@ -39,6 +39,10 @@ struct InstanceOptions {
 // family does not have.
 std::vector<Instance> make_instances(const InstanceOptions& options);
 
+// Up to `count` instances of scenes that there are, each with a random object as the query (the top of a stack), spread
+// evenly over the scenes.
+std::vector<Instance> instances_of(const std::vector<SceneDataset>& datasets, int count, std::uint64_t seed);
+
 // Puts the query of each instance at the pose of the same index and settles.
 std::vector<Outcome> settle_placements(const std::vector<Instance>& instances, const std::vector<Pose>& T_world_query,
                                        int threads, const PhysicsOptions& physics = {});

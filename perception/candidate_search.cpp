@@ -41,8 +41,8 @@ std::vector<Candidate> best_distinct(std::vector<Candidate> candidates, const st
 // One level of the pyramid with a scorer for each thread.
 class Level {
  public:
-  Level(const std::vector<ObjectModel>& models, const std::vector<Observation>& observations, const Explanation& explanation,
-        const std::vector<PlacedObject>& objects, double penetration, int threads)
+  Level(const std::vector<ObjectModel>& models, const std::vector<Observation>& observations,
+        const Explanation& explanation, const std::vector<PlacedObject>& objects, double penetration, int threads)
       : models_(models), explanation_(explanation), objects_(objects), penetration_(penetration) {
     for (int i = 0; i < threads; ++i) scorers_.emplace_back(observations);
   }
@@ -125,7 +125,8 @@ std::vector<Candidate> find_candidates(const std::vector<ObjectModel>& models, c
   for (const PoseHypothesis& guess : hypotheses) {
     candidates.push_back({{guess.model, guess.T_world_object, guess.freedom}, 0.0});
   }
-  const auto level = [&](const std::vector<Observation>& observations, const Explanation& explanation, double leniency) {
+  const auto level = [&](const std::vector<Observation>& observations, const Explanation& explanation,
+                         double leniency) {
     return Level(models, observations, explanation, scene.objects, leniency * options.penetration, options.threads);
   };
   Level coarse = level(pyramid.coarse, scene.coarse, 6.0), medium = level(pyramid.medium, scene.medium, 3.0),

@@ -4,6 +4,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "perception/seen_surface.h"
 #include "perception/shape_score.h"
 #include "perception/stacking.h"
 #include "stability/convex_parts.h"
@@ -114,6 +115,7 @@ RecoveredObject to_object(const Body& body, int index, const ShapeEvidence& evid
   const ObjectAndOffset made = make_object(result.name, local);
   result.object = with_convex_parts(made.object);
   result.T_world_object = make_pose(R, R * made.origin);
+  result.seen = seen_shares(result.object->mesh, result.T_world_object, evidence, slack);
   return result;
 }
 

@@ -34,8 +34,8 @@ struct UnknownRecoveryOptions {
 std::vector<RecoveredObject> recover_unknown(const DepthImage& depth, const Camera& camera, const Table& table,
                                              const LabelImage& labels, const UnknownRecoveryOptions& options = {});
 
-// The same from several views of one scene together: an object is what the readings of all views show, and what any view
-// sees behind it is proven empty. The views' world comes from on_common_table(), their labels need not agree
+// The same from several views of one scene together: an object is what the readings of all views show, and what any
+// view sees behind it is proven empty. The views' world comes from on_common_table(), their labels need not agree
 // (fuse_labels() is applied to them). `label` and `pixels` are those of the first view, 0 if it does not show the
 // object. Throws std::invalid_argument as above, and without any view.
 std::vector<RecoveredObject> recover_unknown(const std::vector<View>& views,

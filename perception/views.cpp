@@ -109,8 +109,8 @@ using FusedObject = std::vector<Segment>;
 double common_share(const Segment& segment, const FusedObject& object, double margin) {
   double share = 0.0;
   for (const Segment& other : object) {
-    share = std::max({share, share_inside(segment.points, other.hull, margin),
-                      share_inside(other.points, segment.hull, margin)});
+    share = std::max(
+        {share, share_inside(segment.points, other.hull, margin), share_inside(other.points, segment.hull, margin)});
   }
   return share;
 }

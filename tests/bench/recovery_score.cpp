@@ -239,10 +239,11 @@ void score_time(const Settings& settings) {
     table_ms.push_back(ms(start, found_table));
     segment_ms.push_back(ms(found_table, segmented));
   }
-  std::printf("one 640x480 frame of 3 objects, %d threads, %d frames: unknown %.0f ms (p90 %.0f), known %.0f ms (p90 "
-              "%.0f); in both table %.0f ms and segmentation %.0f ms\n",
-              settings.threads, settings.frames, median(unknown_ms), percentile(unknown_ms, 0.9), median(known_ms),
-              percentile(known_ms, 0.9), median(table_ms), median(segment_ms));
+  std::printf(
+      "one 640x480 frame of 3 objects, %d threads, %d frames: unknown %.0f ms (p90 %.0f), known %.0f ms (p90 "
+      "%.0f); in both table %.0f ms and segmentation %.0f ms\n",
+      settings.threads, settings.frames, median(unknown_ms), percentile(unknown_ms, 0.9), median(known_ms),
+      percentile(known_ms, 0.9), median(table_ms), median(segment_ms));
 }
 
 double mean(const std::vector<double>& values) {
@@ -296,6 +297,7 @@ int main(int argc, char** argv) {
   app.add_option("--only", settings.only, "one scene alone");
   app.add_flag("--list", settings.list, "print what went wrong");
   CLI11_PARSE(app, argc, argv);
+  std::setvbuf(stdout, nullptr, _IOLBF, BUFSIZ);  // a stopped run keeps its lines
   try {
     for (const int views : {1, settings.views}) {
       if (settings.known > 0) score_known(settings, views);

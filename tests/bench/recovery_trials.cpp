@@ -47,8 +47,7 @@ Scene scene_of_boxes(const Kind& kind, std::uint64_t seed, int index) {
   Rng rng = make_rng(seed, 3000000 + static_cast<std::uint64_t>(index));
   Scene scene;
   for (int attempt = 0; attempt < 1000 && static_cast<int>(scene.objects.size()) < kind.objects; ++attempt) {
-    const ObjectPtr box =
-        make_box("box", {uniform(rng, 0.03, 0.1), uniform(rng, 0.03, 0.1), uniform(rng, 0.03, 0.1)});
+    const ObjectPtr box = make_box("box", {uniform(rng, 0.03, 0.1), uniform(rng, 0.03, 0.1), uniform(rng, 0.03, 0.1)});
     Scene larger = scene;
     larger.T_world_object.push_back(random_placement(scene, *box, kind.task, rng));
     larger.objects.push_back(box);
@@ -150,8 +149,7 @@ std::vector<ObjectError> known_errors(const Scene& truth, const std::vector<Reco
   std::vector<std::tuple<double, std::size_t, std::size_t>> pairs;
   for (std::size_t i = 0; i < errors.size(); ++i) {
     for (std::size_t j = 0; j < recovered.size(); ++j) {
-      const Eigen::Vector3d apart =
-          truth.T_world_object[i].translation() - recovered[j].T_world_object.translation();
+      const Eigen::Vector3d apart = truth.T_world_object[i].translation() - recovered[j].T_world_object.translation();
       pairs.emplace_back(apart.norm(), i, j);
     }
   }
@@ -187,8 +185,8 @@ std::vector<double> unknown_ious(const Scene& truth, const std::vector<Recovered
     for (const RecoveredObject& object : recovered) {
       const double apart = (truth.T_world_object[i].translation() - object.T_world_object.translation()).norm();
       if (apart > 0.5 * (truth.objects[i]->diameter + object.object->diameter)) continue;
-      ious[i] = std::max(ious[i], volume_iou(*truth.objects[i], truth.T_world_object[i], *object.object,
-                                             object.T_world_object, rng));
+      ious[i] = std::max(
+          ious[i], volume_iou(*truth.objects[i], truth.T_world_object[i], *object.object, object.T_world_object, rng));
     }
   }
   return ious;

@@ -50,7 +50,7 @@ TEST_F(PaperNetworkTest, LossFallsAndItsModelSamples) {
   const TrainingSet data({boxes_on_table(200, 1), stacked_cubes(200, 2)}, small_paper_config());
   options_.steps = 300;
   options_.optimizer.learning_rate = 3e-3;
-  const TrainResult result = train(data, small_paper_config(), options_, "", {});
+  const TrainResult result = train(data, small_paper_config(), options_, "");
   const auto mean = [&](std::size_t from, std::size_t to) {
     return std::accumulate(result.losses.begin() + from, result.losses.begin() + to, 0.0) / double(to - from);
   };
@@ -70,13 +70,13 @@ TEST_F(PaperNetworkTest, LossFallsAndItsModelSamples) {
 
 TEST_F(PaperNetworkTest, ResumedTrainingFollowsTheSameCurve) {
   const TrainingSet data({boxes_on_table(50, 1)}, small_paper_config());
-  const TrainResult whole = train(data, small_paper_config(), options_, "", {});
+  const TrainResult whole = train(data, small_paper_config(), options_, "");
   options_.out = folder_ / "halves.safetensors";
   int steps = 0;
   const TrainResult first =
-      train(data, small_paper_config(), options_, "", {}, [&](const TrainReport&) { return ++steps < 3; });
+      train(data, small_paper_config(), options_, "", {{}, [&](const TrainReport&) { return ++steps < 3; }, {}});
   options_.resume = true;
-  const TrainResult second = train(data, small_paper_config(), options_, "", {});
+  const TrainResult second = train(data, small_paper_config(), options_, "");
   std::vector<float> losses = first.losses;
   losses.insert(losses.end(), second.losses.begin(), second.losses.end());
   EXPECT_EQ(losses, whole.losses);

@@ -1,7 +1,10 @@
 #include "diffusion/trainer.h"
 
 #include <cmath>
+#include <condition_variable>
 #include <filesystem>
+#include <mutex>
+#include <thread>
 
 #include <gmock/gmock.h>
 
@@ -40,17 +43,17 @@ class TrainerTest : public testing::Test {
 
 TEST_F(TrainerTest, ResumedTrainingFollowsTheSameCurve) {
   const TrainingSet data({boxes_on_table(50, 1)}, small_config());
-  const TrainResult whole = train(data, small_config(), options_, "", {});
+  const TrainResult whole = train(data, small_config(), options_, "");
   ASSERT_TRUE(whole.finished);
   const std::vector<float> parameters = read_model(options_.out).parameters;
 
   options_.out = folder_ / "halves.safetensors";
   int steps = 0;
   const TrainResult first =
-      train(data, small_config(), options_, "", {}, [&](const TrainReport&) { return ++steps < 5; });
+      train(data, small_config(), options_, "", {{}, [&](const TrainReport&) { return ++steps < 5; }, {}});
   EXPECT_FALSE(first.finished);
   options_.resume = true;
-  const TrainResult second = train(data, small_config(), options_, "", {});
+  const TrainResult second = train(data, small_config(), options_, "");
   EXPECT_TRUE(second.finished);
   std::vector<float> losses = first.losses;
   losses.insert(losses.end(), second.losses.begin(), second.losses.end());
@@ -60,39 +63,124 @@ TEST_F(TrainerTest, ResumedTrainingFollowsTheSameCurve) {
 
 TEST_F(TrainerTest, SeveralThreadsGiveTheSameLossesUpToRounding) {
   const TrainingSet data({boxes_on_table(50, 1)}, small_config());
-  const TrainResult one = train(data, small_config(), options_, "", {});
+  const TrainResult one = train(data, small_config(), options_, "");
   options_.threads = 3;
   options_.micro_batch = 4;
-  const TrainResult three = train(data, small_config(), options_, "", {});
+  const TrainResult three = train(data, small_config(), options_, "");
   // Sums in another order differ by some 1e-7, which Adam's first steps magnify where gradients are tiny.
   for (std::size_t i = 0; i < one.losses.size(); ++i) EXPECT_NEAR(three.losses[i], one.losses[i], 0.02f) << i;
 }
 
+// Processes that are threads: sums through shared memory.
+class ThreadPeers : public Peers {
+ public:
+  struct Meeting {
+    std::mutex mutex;
+    std::condition_variable changed;
+    std::vector<float> sum;
+    int arrived = 0, round = 0;
+  };
+  ThreadPeers(int rank, int count, Meeting& meeting) : rank_(rank), count_(count), meeting_(meeting) {}
+  int rank() const override { return rank_; }
+  int count() const override { return count_; }
+  void sum(std::vector<float>& values) override {
+    std::unique_lock<std::mutex> lock(meeting_.mutex);
+    const int round = meeting_.round;
+    if (meeting_.arrived == 0) meeting_.sum.assign(values.size(), 0.0f);
+    for (std::size_t i = 0; i < values.size(); ++i) meeting_.sum[i] += values[i];
+    if (++meeting_.arrived == count_) {
+      meeting_.arrived = 0;
+      ++meeting_.round;
+      result_ = meeting_.sum;
+      for (ThreadPeers* other : others) other->result_ = meeting_.sum;
+      meeting_.changed.notify_all();
+    } else {
+      meeting_.changed.wait(lock, [&] { return meeting_.round != round; });
+    }
+    values = result_;
+  }
+  std::vector<ThreadPeers*> others;
+
+ private:
+  int rank_, count_;
+  Meeting& meeting_;
+  std::vector<float> result_;
+};
+
+TEST_F(TrainerTest, TwoProcessesFollowTheCurveOfOneWithTwiceTheBatch) {
+  const TrainingSet data({boxes_on_table(50, 1)}, small_config());
+  const auto train_two = [&](TrainOptions options, int steps_until_stop) {
+    ThreadPeers::Meeting meeting;
+    ThreadPeers first(0, 2, meeting), second(1, 2, meeting);
+    first.others = {&second};
+    second.others = {&first};
+    int steps = 0;
+    TrainCallbacks stops;
+    stops.keep_going = [&](const TrainReport&) { return ++steps < steps_until_stop; };
+    std::thread other([&] { train(data, small_config(), options, "", {}, &second); });
+    const TrainResult result = train(data, small_config(), options, "", stops, &first);
+    other.join();
+    return result;
+  };
+  const TrainResult alone = train(data, small_config(), options_, "");
+  options_.out = folder_ / "two.safetensors";
+  options_.batch = 8;
+  const TrainResult two = train_two(options_, 1000);
+  ASSERT_EQ(two.losses.size(), alone.losses.size());
+  for (std::size_t i = 0; i < alone.losses.size(); ++i) EXPECT_NEAR(two.losses[i], alone.losses[i], 0.02f) << i;
+
+  // One that stops both, and goes on with both from the file of the first.
+  options_.out = folder_ / "halves.safetensors";
+  const TrainResult half = train_two(options_, 5);
+  EXPECT_FALSE(half.finished);
+  options_.resume = true;
+  const TrainResult rest = train_two(options_, 1000);
+  EXPECT_TRUE(rest.finished);
+  std::vector<float> losses = half.losses;
+  losses.insert(losses.end(), rest.losses.begin(), rest.losses.end());
+  EXPECT_EQ(losses, two.losses);
+}
+
+TEST_F(TrainerTest, ValidationIsLogged) {
+  const TrainingSet data({boxes_on_table(20, 1)}, small_config());
+  TrainCallbacks callbacks;
+  std::size_t parameters = 0;
+  callbacks.validate = [&](const ModelConfig&, const std::vector<float>& p) {
+    parameters = p.size();
+    return 0.625;
+  };
+  const TrainResult result = train(data, small_config(), options_, "", callbacks);
+  EXPECT_EQ(parameters, read_model(options_.out).parameters.size());
+  EXPECT_EQ(result.last.validation, 0.625);
+  EXPECT_THAT(read_file(options_.out + ".csv"), HasSubstr(",0.625\n"));
+  EXPECT_THAT(read_model(options_.out).training, HasSubstr("\"validation\":0.625"));
+}
+
 TEST_F(TrainerTest, CheckpointOfAnotherRunIsRefused) {
   const TrainingSet data({boxes_on_table(50, 1)}, small_config());
-  train(data, small_config(), options_, "", {});
+  train(data, small_config(), options_, "");
   options_.resume = true;
   options_.seed = 9;
   try {
-    train(data, small_config(), options_, "", {});
+    train(data, small_config(), options_, "");
     FAIL();
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(), HasSubstr("another configuration, seed or batch size"));
   }
   ModelConfig other = small_config();
   other.hidden = 64;
-  EXPECT_THROW(train(data, other, options_, "", {}), InputError);
+  EXPECT_THROW(train(data, other, options_, ""), InputError);
   std::filesystem::resize_file(options_.out + ".checkpoint", 1000);
-  EXPECT_THROW(train(data, small_config(), options_, "", {}), InputError);
+  EXPECT_THROW(train(data, small_config(), options_, ""), InputError);
 }
 
 TEST_F(TrainerTest, BadOutputAndBudgetAreRefused) {
   const TrainingSet data({boxes_on_table(5, 1)}, small_config());
   TrainOptions no_budget = options_;
   no_budget.steps = 0;
-  EXPECT_THROW(train(data, small_config(), no_budget, "", {}), InputError);
+  EXPECT_THROW(train(data, small_config(), no_budget, ""), InputError);
   options_.out = folder_ / "missing/model.safetensors";
-  EXPECT_THROW(train(data, small_config(), options_, "", {}), InputError);
+  EXPECT_THROW(train(data, small_config(), options_, ""), InputError);
 }
 
 TEST_F(TrainerTest, DivergenceStopsAndKeepsTheLastGoodState) {
@@ -101,7 +189,7 @@ TEST_F(TrainerTest, DivergenceStopsAndKeepsTheLastGoodState) {
   options_.warm_up = 0;
   options_.steps = 200;
   try {
-    train(data, small_config(), options_, "", {});
+    train(data, small_config(), options_, "");
     FAIL();
   } catch (const std::runtime_error& error) {
     EXPECT_THAT(error.what(), HasSubstr("not finite"));
@@ -132,7 +220,7 @@ TEST_F(TrainerTest, LearnsToLayABoxOnTheTable) {
   options_.threads = 2;
   options_.optimizer.learning_rate = 3e-3;
   options_.optimizer.average = 0.99;
-  const TrainResult result = train(data, config, options_, "", {});
+  const TrainResult result = train(data, config, options_, "");
   EXPECT_LT(result.last.loss, 0.75);
 
   const PlacementModel model = PlacementModel::load(options_.out);
