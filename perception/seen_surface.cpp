@@ -21,24 +21,26 @@ std::vector<Eigen::Vector3d> even_points() {
 }
 
 // Whether the view's reading at the point (camera's frame) shows it; `normal` is the surface's.
-bool shows(const ViewEvidence& view, const Eigen::Vector3d& p, const Eigen::Vector3d& normal, double slack) {
+bool shows(const View& view, const DepthSigma& sigma, const Eigen::Vector3d& p, const Eigen::Vector3d& normal,
+           double slack) {
   if (p.z() <= 0.0) return false;
   const Eigen::Vector2d pixel = project(view.camera, p);
   if (!(pixel.cwiseAbs().maxCoeff() < 1e6)) return false;
   const int u = static_cast<int>(std::lround(pixel.x())), v = static_cast<int>(std::lround(pixel.y()));
   if (!view.depth.contains(v, u) || !is_valid_depth(view.depth.at(v, u))) return false;
   const double z = view.depth.at(v, u), facing = std::max(0.1, -normal.dot(p.normalized()));
-  return std::abs(z - p.z()) < 3.0 * view.sigma(z) + slack / facing;
+  return std::abs(z - p.z()) < 3.0 * sigma(z) + slack / facing;
 }
 
 }  // namespace
 
-std::vector<float> seen_shares(const TriangleMesh& mesh, const Pose& T_world_object, const ShapeEvidence& evidence,
-                               double slack) {
+std::vector<float> seen_shares(const RecoveredObject& object, const std::vector<View>& views, double slack) {
   static const std::vector<Eigen::Vector3d> kPoints = even_points();
+  const TriangleMesh& mesh = object.object->mesh;
   std::vector<float> shares(mesh.triangles.size(), 0.0f);
-  for (const ViewEvidence& view : evidence) {
-    const Pose T_camera_object = view.T_world_camera.inverse() * T_world_object;
+  for (const View& view : views) {
+    const DepthSigma sigma = calibrate_sigma(view.depth, view.camera, table_of(view));
+    const Pose T_camera_object = view.T_world_camera.inverse() * object.T_world_object;
     for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
       Eigen::Matrix3d corners;  // columns, camera's frame
       for (int k = 0; k < 3; ++k) corners.col(k) = T_camera_object * mesh.vertices[mesh.triangles[i][k]];
@@ -46,7 +48,7 @@ std::vector<float> seen_shares(const TriangleMesh& mesh, const Pose& T_world_obj
           (corners.col(1) - corners.col(0)).cross(corners.col(2) - corners.col(0)).normalized();
       if (normal.dot(corners.col(0)) >= 0.0) continue;  // turned away
       const auto count = std::count_if(kPoints.begin(), kPoints.end(), [&](const Eigen::Vector3d& weights) {
-        return shows(view, corners * weights, normal, slack);
+        return shows(view, sigma, corners * weights, normal, slack);
       });
       shares[i] = std::max(shares[i], static_cast<float>(count) / static_cast<float>(kPoints.size()));
     }

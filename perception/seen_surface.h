@@ -3,13 +3,14 @@
 
 #include <vector>
 
-#include "perception/shape_fit.h"
+#include "perception/recovery.h"
+#include "perception/views.h"
 
 namespace dofusion {
 
-// For each triangle the share (0 … 1) of it that faces a camera and that a reading shows, to three sigmas along the ray
-// and `slack` (metres) across the surface; over several views the largest. 0: nobody has seen that it is there.
-std::vector<float> seen_shares(const TriangleMesh& mesh, const Pose& T_world_object, const ShapeEvidence& evidence,
-                               double slack);
+// For each triangle of the object's mesh the share (0 … 1) of it that faces a camera and that a reading shows, to three
+// sigmas of the view's table along the ray and `slack` (metres) across the surface; over several views the largest. 0:
+// nobody has seen that it is there. The views' world is the object's (on_common_table()); their labels are not used.
+std::vector<float> seen_shares(const RecoveredObject& object, const std::vector<View>& views, double slack = 0.002);
 
 }  // namespace dofusion

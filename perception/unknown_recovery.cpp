@@ -4,7 +4,6 @@
 #include <limits>
 #include <stdexcept>
 
-#include "perception/seen_surface.h"
 #include "perception/shape_score.h"
 #include "perception/stacking.h"
 #include "stability/convex_parts.h"
@@ -115,7 +114,6 @@ RecoveredObject to_object(const Body& body, int index, const ShapeEvidence& evid
   const ObjectAndOffset made = make_object(result.name, local);
   result.object = with_convex_parts(made.object);
   result.T_world_object = make_pose(R, R * made.origin);
-  result.seen = seen_shares(result.object->mesh, result.T_world_object, evidence, slack);
   return result;
 }
 
