@@ -89,7 +89,6 @@ ScanFolder::~ScanFolder() {
 void ScanFolder::check_settings(const std::string& text) const {
   const std::string before = read_file(record_);
   if (before == text) return;
-  const ordered_json old = ordered_json::parse(before, nullptr, false);
   const std::string difference =
       first_difference(ordered_json::parse(before, nullptr, false), ordered_json::parse(text));
   throw InputError(partial_.string() + ": was begun with " + difference +

@@ -172,12 +172,5 @@ TEST_F(UnusableScenes, CameraUnderTheTable) {
   expect_scan_refusal({}, {"scene 2", "image 0", "under the table"});
 }
 
-TEST_F(UnusableScenes, MoreObjectsThanLabels) {
-  std::vector<Pose> many;
-  for (int k = 0; k < 254; ++k) many.push_back(at(0.06 * (k % 16), 0.06 * (k / 16), 0.025));
-  write_scenes({many});
-  expect_scan_refusal({}, {"scene 0", "254 objects", "253"});
-}
-
 }  // namespace
 }  // namespace dofusion
