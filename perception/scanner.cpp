@@ -17,11 +17,6 @@ namespace {
 constexpr int kBand = 4;  // rows of tiles that a thread takes at a time
 constexpr int kMaxObjects = 255 - kLabelFirstObject;
 
-TriangleMesh table_mesh(double half_size) {
-  const double h = half_size;
-  return {{{-h, -h, 0}, {h, -h, 0}, {h, h, 0}, {-h, h, 0}}, {{0, 1, 2}, {0, 2, 3}}};
-}
-
 std::vector<Eigen::Vector3d> triangle_normals(const TriangleMesh& mesh) {
   std::vector<Eigen::Vector3d> normals;
   normals.reserve(mesh.triangles.size());
@@ -64,7 +59,7 @@ struct Scanner::Impl {
   std::vector<EmbreeGeometry> instances;              // per object, geometry id i of the world
   std::vector<std::vector<Eigen::Vector3d>> normals;  // per object and triangle, in the object's frame
   std::vector<Eigen::Matrix3d> R_world_object;        // per object
-  EmbreeGeometry table;                               // geometry id objects.size() of the world
+  Table table;
   EmbreeScene world;
   int threads = 1;
   bool changed = true;  // since the world was last committed
@@ -76,7 +71,7 @@ struct Scanner::Impl {
     changed = false;
   }
 
-  // Embree's geometry ids: an object's hit carries its instance, the table's none.
+  // An object's hit carries its instance, which is the object's index, the table's none.
   int object_of(unsigned instance) const {
     return instance == RTC_INVALID_GEOMETRY_ID ? -1 : static_cast<int>(instance);
   }
@@ -121,10 +116,7 @@ Scanner::Scanner(std::vector<ObjectPtr> objects, const ScannerOptions& options) 
     rtcSetGeometryTimeStepCount(impl.instances.back().get(), 1);
     rtcAttachGeometryByID(impl.world.get(), impl.instances.back().get(), static_cast<unsigned>(i));
   }
-  if (options.table) {
-    impl.table = make_triangles(impl.device.get(), table_mesh(options.table_half_size));
-    rtcAttachGeometryByID(impl.world.get(), impl.table.get(), static_cast<unsigned>(impl.objects.size()));
-  }
+  if (options.table) impl.table.half_size = static_cast<float>(options.table_half_size);
   set_poses(std::vector<Pose>(impl.objects.size(), Pose::Identity()));
 }
 
@@ -240,7 +232,7 @@ void Scanner::Impl::render_grid(const PixelGrid& grid, const Pose& T_world_camer
   const std::int64_t tile_rows = (grid.rows + kTile - 1) / kTile;
   const std::int64_t bands = (tile_rows + kBand - 1) / kBand;
   parallel_for(bands, thread_count, [&](std::int64_t band, int) {
-    TilePacket tile(grid);
+    TilePacket tile(grid, table);
     TileWriter writer(*this, T_world_camera, scan);
     const int end = static_cast<int>(std::min(tile_rows, (band + 1) * kBand)) * kTile;
     for (int row0 = static_cast<int>(band) * kBand * kTile; row0 < end; row0 += kTile)
@@ -301,6 +293,9 @@ std::optional<Scanner::Hit> Scanner::cast_ray(const Eigen::Vector3d& origin_worl
   ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   rtcIntersect1(impl.world.get(), &context, &ray);
+  const float table =
+      impl.table.distance(ray.ray.org_x, ray.ray.org_y, ray.ray.org_z, ray.ray.dir_x, ray.ray.dir_y, ray.ray.dir_z);
+  if (table < ray.ray.tfar) return Hit{table, -1, impl.normal_world(-1, 0)};
   if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
   const int object = impl.object_of(ray.hit.instID[0]);
   return Hit{ray.ray.tfar, object, impl.normal_world(object, ray.hit.primID)};
@@ -332,8 +327,12 @@ std::vector<std::uint8_t> Scanner::occluded(const std::vector<Segment>& segments
       packet.flags[k] = 0;
     }
     rtcOccluded16(valid, impl_->world.get(), &context, &packet);
-    for (std::size_t k = 0; k < kPacket && first + k < segments.size(); ++k)
-      result[first + k] = packet.tfar[k] < 0.0f ? 1 : 0;  // Embree marks an occluded ray with -infinity
+    for (std::size_t k = 0; k < kPacket && first + k < segments.size(); ++k) {
+      const float table = impl_->table.distance(packet.org_x[k], packet.org_y[k], packet.org_z[k], packet.dir_x[k],
+                                                packet.dir_y[k], packet.dir_z[k]);
+      // Embree marks an occluded ray with -infinity.
+      result[first + k] = packet.tfar[k] < 0.0f || table <= 1.0f ? 1 : 0;
+    }
   }
   return result;
 }

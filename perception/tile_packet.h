@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include <Eigen/Core>
@@ -41,10 +42,26 @@ struct PixelGrid {
   Eigen::Vector3f origin, corner, right, down;
 };
 
+// Stands for the table among Embree's geometry ids.
+inline constexpr unsigned kTableGeometry = 0xFFFFFFFEu;
+
+// The square |x|, |y| <= half_size of the plane z = 0; none if half_size is negative. Not among Embree's triangles: a
+// second kind of geometry in a scene costs a second tree to walk through.
+struct Table {
+  float half_size = -1.0f;
+
+  // Where the ray origin + t direction meets it, t >= 0; infinity if it does not.
+  float distance(float ox, float oy, float oz, float dx, float dy, float dz) const {
+    const float t = -oz / dz;
+    const bool meets = (t >= 0.0f) & (std::abs(ox + t * dx) <= half_size) & (std::abs(oy + t * dy) <= half_size);
+    return meets ? t : kInfinity;  // a ray within the plane has t = NaN or infinity and does not meet it
+  }
+};
+
 // A packet of the rays through 4 x 4 neighbouring pixels, which moves over the grid.
 class TilePacket {
  public:
-  explicit TilePacket(const PixelGrid& grid) : grid_(grid) {
+  TilePacket(const PixelGrid& grid, const Table& table) : grid_(grid), table_(table) {
     rtcInitIntersectContext(&context_);
     context_.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
     for (int k = 0; k < kPacket; ++k) {
@@ -77,12 +94,14 @@ class TilePacket {
       packet_.hit.primID[k] = RTC_INVALID_GEOMETRY_ID;
     }
     rtcIntersect16(valid_, world, &context_, &packet_);
+    lay_table();
   }
 
   int rows() const { return rows_; }
   int columns() const { return columns_; }
 
   bool hit(int k) const { return packet_.hit.geomID[k] != RTC_INVALID_GEOMETRY_ID; }
+  // RTC_INVALID_GEOMETRY_ID for the table.
   unsigned instance(int k) const { return packet_.hit.instID[0][k]; }
   unsigned triangle(int k) const { return packet_.hit.primID[k]; }
   const float* depths() const { return packet_.ray.tfar; }
@@ -98,7 +117,23 @@ class TilePacket {
   }
 
  private:
+  // Puts the table where it is nearer than what was hit. (Not by limiting the rays beforehand: see Scanner::occluded.)
+  void lay_table() {
+    if (table_.half_size < 0.0f) return;
+    const RTCRay16& ray = packet_.ray;
+    for (int k = 0; k < kPacket; ++k) {
+      const float t =
+          table_.distance(ray.org_x[k], ray.org_y[k], ray.org_z[k], ray.dir_x[k], ray.dir_y[k], ray.dir_z[k]);
+      const bool nearer = t < ray.tfar[k];
+      packet_.ray.tfar[k] = nearer ? t : ray.tfar[k];
+      packet_.hit.geomID[k] = nearer ? kTableGeometry : packet_.hit.geomID[k];
+      packet_.hit.instID[0][k] = nearer ? RTC_INVALID_GEOMETRY_ID : packet_.hit.instID[0][k];
+      packet_.hit.primID[k] = nearer ? RTC_INVALID_GEOMETRY_ID : packet_.hit.primID[k];
+    }
+  }
+
   const PixelGrid& grid_;
+  Table table_;
   int rows_ = 0, columns_ = 0;  // of the tile within the grid
   RTCIntersectContext context_;
   RTCRayHit16 packet_;
