@@ -26,6 +26,7 @@ class NoisyReader {
  public:
   NoisyReader(const Scan& scan, const Camera& camera, const SensorTerms& terms, double scale, Rng& rng)
       : scan_(scan), camera_(camera), terms_(terms), scale_(scale), rng_(rng) {
+    least_sine_ = std::sin(terms.grazing_limit_deg * kDegree * std::min(scale, 1.0));
     const auto field = [&](double length) { return smooth_noise(camera.width, camera.height, length, rng); };
     if (terms.correlation_px > 0.0) {
       if (terms.axial_sigma) axial_ = field(terms.correlation_px);
@@ -40,8 +41,9 @@ class NoisyReader {
   double read(int row, int column) {
     if (scan_.depth.at(row, column) <= 0.0f) return 0.0;
     if (!holes_.pixels.empty() && holes_.at(row, column)) return 0.0;
-    const double incidence = incidence_angle(scan_, camera_, row, column);
-    if (kPi / 2 - incidence < terms_.grazing_limit_deg * kDegree * std::min(scale_, 1.0)) return 0.0;
+    if (is_grazing(row, column)) return 0.0;
+    const bool by_incidence = terms_.by_incidence || terms_.incidence_drop > 0.0;
+    const double incidence = by_incidence ? incidence_angle(scan_, camera_, row, column) : 0.0;
     if (terms_.incidence_drop > 0.0 && happens(terms_.incidence_drop * (1.0 - std::cos(incidence)))) return 0.0;
     double depth = shifted_depth(row, column, incidence);
     if (const auto across = depth_across_edge(scan_, camera_, row, column)) {
@@ -61,6 +63,14 @@ class NoisyReader {
   }
 
  private:
+  // The ray meets the surface at less than the limit: a sine of the angle between them, which is a cosine of the
+  // incidence, less than the limit's.
+  bool is_grazing(int row, int column) const {
+    const Eigen::Vector3d ray = unproject(camera_, column, row, 1.0);
+    const double along = ray.dot(scan_.normals.at(row, column).cast<double>());
+    return along * along < least_sine_ * least_sine_ * ray.squaredNorm();
+  }
+
   bool happens(double probability) {
     return probability > 0.0 && uniform_(rng_) < clamp_probability(scale_ * probability);
   }
@@ -83,6 +93,7 @@ class NoisyReader {
   const Camera& camera_;
   SensorTerms terms_;
   double scale_;
+  double least_sine_ = 0.0;  // of the angle between ray and surface, for a reading
   Rng& rng_;
   Image<float> axial_, right_, down_, warp_;  // smooth noise; empty without the term
   Image<std::uint8_t> holes_;                 // empty without the term
@@ -134,10 +145,12 @@ SensorTerms sensor_terms(SensorModel sensor) {
       return terms;
     case SensorModel::kRealsense:
       terms.axial_sigma = realsense_sigma;
+      terms.by_incidence = false;
       terms.edge_drop = 0.07;
       return terms;
     case SensorModel::kAzure:
       terms.axial_sigma = azure_sigma;
+      terms.by_incidence = false;
       terms.lateral_sigma_px = azure_lateral_sigma_px;
       terms.edge_drop = 0.109;
       return terms;

@@ -31,6 +31,7 @@ struct SensorTerms {
                                    // to pixel
   double warp_px = 0.0;            // disparity error that bends planes, standard deviation; pixels as below
   double warp_length_px = 60.0;    // over which the warp changes (smooth_noise.h)
+  bool by_incidence = true;  // false: neither sigma depends on it; it is not worked out
   double disparity_step_px = 0.0;  // quantisation, of a 0.075 m baseline and 585.5 px focal length; 0: none
   double grazing_limit_deg = 0.0;  // no reading where the ray meets the surface at less than this (Handa: 8)
   double incidence_drop = 0.0;     // times 1 - cos(incidence): probability of no reading; see sensor_terms
