@@ -1,5 +1,4 @@
 #include "perception/pcl_conversions.h"
-#include "stability/files.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +12,8 @@
 #include <pcl/sample_consensus/sac_model_plane.h>
 #include <pcl/search/kdtree.h>
 #include <pcl/segmentation/extract_clusters.h>
+
+#include "stability/files.h"
 
 namespace dofusion {
 namespace {
