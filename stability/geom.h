@@ -51,7 +51,7 @@ struct SceneCamera {
   std::string name;                       // may be empty
   int body = -1;                          // index of the moving body that it is fixed to; -1: it stands in the world
   Pose T_body_camera = Pose::Identity();  // T_world_camera if it stands in the world
-  double fovy = 0.0;                      // radians, the image's height; perception/camera.h makes a Camera of it
+  double fovy = 0.0;                      // radians, the image's height; camera_of_fovy makes a Camera of it
 };
 
 // T_world_camera with the bodies at these poses, one for each of the scene's bodies.

@@ -7,6 +7,16 @@ namespace {
 
 Pose at(double x, double y, double z) { return make_pose(Eigen::Matrix3d::Identity(), {x, y, z}); }
 
+TEST(Plausibility, ASceneThatStandsTakesOneAttemptAndOneThatFallsSeveral) {
+  const ObjectPtr box = make_box("box", {0.05, 0.05, 0.05});
+  EXPECT_EQ(make_plausible({{box}, {at(0, 0, 0.025)}}).attempts, 1);
+  // Its centre of mass lies beyond the edge of what it is on: it falls from every start, by about its own height.
+  const PlausibleScene falls = make_plausible({{box, box}, {at(0, 0, 0.025), at(0.03, 0, 0.075)}});
+  EXPECT_EQ(falls.attempts, 4);
+  EXPECT_EQ(falls.status, SettleStatus::kSettled);
+  EXPECT_GT(falls.moved_pct, 10.0);
+}
+
 TEST(Plausibility, AStandingSceneStays) {
   const ObjectPtr box = make_box("box", {0.05, 0.05, 0.05});
   const PlausibleScene result = make_plausible({{box, box}, {at(0, 0, 0.0251), at(0, 0, 0.0753)}});
