@@ -29,6 +29,18 @@ void remove_temporary_files(const fs::path& folder) {
   }
 }
 
+// "seed 9, not 10"; of settings within settings the inner ones.
+std::string first_difference(const ordered_json& before, const ordered_json& now) {
+  if (!before.is_object()) return "other settings";
+  for (const auto& [key, value] : now.items()) {
+    const ordered_json was = before.value(key, ordered_json());
+    if (was == value) continue;
+    if (was.is_object() && value.is_object()) return first_difference(was, value);
+    return key + " " + was.dump() + ", not " + value.dump();
+  }
+  return "other settings";
+}
+
 }  // namespace
 
 ScanFolder::ScanFolder(const fs::path& out, const ordered_json& settings) {
@@ -77,16 +89,8 @@ ScanFolder::~ScanFolder() {
 void ScanFolder::check_settings(const std::string& text) const {
   const std::string before = read_file(record_);
   if (before == text) return;
-  const ordered_json old = ordered_json::parse(before, nullptr, false);
-  std::string difference = "other settings";
-  if (old.is_object()) {
-    for (const auto& [key, value] : ordered_json::parse(text).items()) {
-      const ordered_json was = old.value(key, ordered_json());
-      if (was == value) continue;
-      difference = key + " " + was.dump() + ", not " + value.dump();
-      break;
-    }
-  }
+  const std::string difference =
+      first_difference(ordered_json::parse(before, nullptr, false), ordered_json::parse(text));
   throw InputError(partial_.string() + ": was begun with " + difference +
                    "; give the arguments that it was begun with, or delete it to begin anew");
 }

