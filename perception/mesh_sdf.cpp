@@ -2,99 +2,132 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <stdexcept>
-#include <vector>
+#include <string>
 
-#include "perception/embree_handles.h"
+#include "perception/morton_order.h"
+#include "perception/triangle_tree.h"
+#include "perception/winding_number.h"
+#include "stability/mesh_holes.h"
+#include "stability/mesh_topology.h"
+#include "stability/parallel_for.h"
 #include "stability/signed_triangles.h"
 
 namespace dofusion {
 namespace {
 
-struct Query {
-  const std::vector<SignedTriangle>& triangles;
-  Eigen::Vector3d point;
-  double coordinate_size;  // the largest coordinate of point and mesh
-  TriangleDistance nearest{std::numeric_limits<double>::infinity(), 1.0};
-};
-
-// Embree culls boxes in float; a radius a little too large costs a few triangles more and misses none.
-float safe_radius(double radius, double coordinate_size) {
-  constexpr double kFloatError = 4.0 * std::numeric_limits<float>::epsilon();
-  return static_cast<float>(radius * (1.0 + kFloatError) + kFloatError * coordinate_size);
+std::string percent(double share) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g %%", 100.0 * share);
+  return text;
 }
 
-// Called by Embree for every triangle whose box is within the radius; shrinks the radius.
-bool visit_triangle(RTCPointQueryFunctionArguments* arguments) {
-  Query& query = *static_cast<Query*>(arguments->userPtr);
-  const TriangleDistance distance = distance_to_triangle(query.triangles[arguments->primID], query.point);
-  if (!(distance.squared < query.nearest.squared)) return false;
-  query.nearest = distance;
-  const float radius = safe_radius(std::sqrt(distance.squared), query.coordinate_size);
-  if (!(radius < arguments->query->radius)) return false;
-  arguments->query->radius = radius;
-  return true;
+// The number of open edges.
+std::size_t check_surface(const TriangleMesh& mesh) {
+  const SurfaceFaults faults = surface_faults(mesh);
+  if (mesh.triangles.empty() || faults.odd.count > 0 || faults.unbalanced.count > 0) {
+    throw std::invalid_argument("a signed distance needs a surface with one inside; this mesh with " +
+                                std::to_string(mesh.triangles.size()) +
+                                " triangles has none, or inner walls, or flipped triangles");
+  }
+  if (faults.open.count == 0) return 0;
+  const FilledMesh filled = fill_holes(mesh);
+  if (filled.area_share > kMostOpenShare) {
+    throw std::invalid_argument("a signed distance needs a closed mesh; the holes of this one, " +
+                                std::to_string(filled.open_edges) + " open edges, would take " +
+                                percent(filled.area_share) + " of its surface, more than " + percent(kMostOpenShare));
+  }
+  return filled.open_edges;
 }
 
 }  // namespace
 
 struct MeshSdf::Impl {
   Eigen::Vector3d centre;  // of the mesh; what follows is relative to it, where floats are finest
-  double half_size = 0.0;  // the largest coordinate
+  std::size_t open_edges = 0;
   std::vector<SignedTriangle> triangles;
-  EmbreeDevice device;
-  EmbreeScene scene;
+  TriangleTree tree;
+  std::vector<NodeDipoles> dipoles;  // of an open mesh
+
+  // The triangle that is nearest, by way of one that was near to a point close by, or -1.
+  int nearest(const Eigen::Vector3d& p, int start_slot) const {
+    if (std::max(tree.half_size, p.cwiseAbs().maxCoeff()) < kFarthestCoordinate)
+      return best_nearest_function()(arrays_of(tree), p.data(), start_slot).slot;
+    NearestTriangle nearest;
+    for (int slot = 0; slot < static_cast<int>(tree.triangle.size()); ++slot) {
+      if (tree.triangle[slot] < 0) continue;
+      const double squared = distance_to_triangle(triangles[tree.triangle[slot]], p).squared;
+      if (squared < nearest.squared) nearest = {slot, squared};
+    }
+    return nearest.slot;
+  }
+
+  // `slot`: of the nearest triangle.
+  double distance(const Eigen::Vector3d& p, int slot) const {
+    if (slot < 0) return p.allFinite() ? std::numeric_limits<double>::infinity() : std::nan("");
+    const TriangleDistance nearest = distance_to_triangle(triangles[tree.triangle[slot]], p);
+    const double side = dipoles.empty() ? nearest.side : 0.5 - winding_number(tree, dipoles, p);
+    return std::copysign(std::sqrt(nearest.squared), side);
+  }
 };
 
 MeshSdf::MeshSdf(const TriangleMesh& mesh) : impl_(std::make_unique<Impl>()) {
-  if (mesh.triangles.empty() || !is_closed(mesh))
-    throw std::invalid_argument("a signed distance needs a closed mesh; this one with " +
-                                std::to_string(mesh.triangles.size()) + " triangles is not");
-  const BoundingBox box = bounding_box(mesh);
+  const TriangleMesh welded = weld(mesh);
+  impl_->open_edges = check_surface(welded);
+  const BoundingBox box = bounding_box(welded);
   impl_->centre = 0.5 * (box.min + box.max);
-  impl_->half_size = 0.5 * (box.max - box.min).maxCoeff();
-  const TriangleMesh centred = weld(translated(mesh, -impl_->centre));
+  const TriangleMesh centred = translated(welded, -impl_->centre);
   impl_->triangles = signed_triangles(centred);
-  impl_->device = make_embree_device();
-  impl_->scene = make_triangle_scene(impl_->device.get(), centred);
+  impl_->tree = make_triangle_tree(centred);
+  if (impl_->open_edges > 0) impl_->dipoles = make_dipoles(impl_->tree);
 }
 
 MeshSdf::~MeshSdf() = default;
 MeshSdf::MeshSdf(MeshSdf&&) noexcept = default;
 MeshSdf& MeshSdf::operator=(MeshSdf&&) noexcept = default;
 
+std::size_t MeshSdf::open_edges() const { return impl_->open_edges; }
+
 double MeshSdf::operator()(const Eigen::Vector3d& point) const {
-  const Eigen::Vector3d centred = point - impl_->centre;
-  Query query{impl_->triangles, centred, std::max(impl_->half_size, centred.cwiseAbs().maxCoeff())};
-  RTCPointQuery ball;
-  ball.x = static_cast<float>(query.point.x());
-  ball.y = static_cast<float>(query.point.y());
-  ball.z = static_cast<float>(query.point.z());
-  ball.time = 0.0f;
-  ball.radius = std::numeric_limits<float>::infinity();
-  RTCPointQueryContext context;
-  rtcInitPointQueryContext(&context);
-  rtcPointQuery(impl_->scene.get(), &ball, &context, visit_triangle, &query);
-  return std::copysign(std::sqrt(query.nearest.squared), query.nearest.side);
+  const Eigen::Vector3d p = point - impl_->centre;
+  return impl_->distance(p, impl_->nearest(p, -1));
 }
 
-SdfGrid mesh_to_sdf_grid(const TriangleMesh& mesh, const SdfGridOptions& options) {
-  const MeshSdf distance(mesh);
-  return make_sdf_grid(
-      bounding_box(mesh), [&](const Eigen::Vector3d& point) { return distance(point); }, options);
+std::vector<double> MeshSdf::distances(const std::vector<Eigen::Vector3d>& points, int threads) const {
+  constexpr std::int64_t kChunk = 1024;
+  const std::vector<std::uint32_t> order = morton_order(points);
+  const auto count = static_cast<std::int64_t>(points.size());
+  std::vector<double> distances(points.size());
+  parallel_for((count + kChunk - 1) / kChunk, threads, [&](std::int64_t chunk, int) {
+    int slot = -1;
+    for (std::int64_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) {
+      const Eigen::Vector3d p = points[order[i]] - impl_->centre;
+      slot = impl_->nearest(p, slot);
+      distances[order[i]] = impl_->distance(p, slot);
+    }
+  });
+  return distances;
 }
 
-ObjectPtr with_distance_field(const ObjectPtr& object, const SdfGridOptions& options) {
+SdfGrid mesh_to_sdf_grid(const TriangleMesh& mesh, const SdfGridOptions& options, int threads) {
+  SdfGrid grid = empty_sdf_grid(bounding_box(mesh), options);
+  const std::vector<double> distances = MeshSdf(mesh).distances(node_positions(grid), threads);
+  grid.values.assign(distances.begin(), distances.end());
+  return grid;
+}
+
+ObjectPtr with_distance_field(const ObjectPtr& object, const SdfGridOptions& options, int threads) {
   constexpr std::size_t kFewTriangles = 64;
   if (object->box_edges || (object->convex && object->mesh.triangles.size() <= kFewTriangles)) return object;
   auto copy = std::make_shared<Object>(*object);
-  copy->sdf = std::make_shared<SdfGrid>(mesh_to_sdf_grid(object->mesh, options));
+  copy->sdf = std::make_shared<SdfGrid>(mesh_to_sdf_grid(object->mesh, options, threads));
   return copy;
 }
 
-Scene with_distance_fields(Scene scene, const SdfGridOptions& options) {
-  for (ObjectPtr& object : scene.objects) object = with_distance_field(object, options);
+Scene with_distance_fields(Scene scene, const SdfGridOptions& options, int threads) {
+  for (ObjectPtr& object : scene.objects) object = with_distance_field(object, options, threads);
   return scene;
 }
 

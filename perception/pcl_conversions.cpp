@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <sstream>
 
 #include <Eigen/Dense>
+#include <pcl/conversions.h>
+#include <pcl/io/pcd_io.h>
 #include <pcl/sample_consensus/ransac.h>
 #include <pcl/sample_consensus/sac_model_plane.h>
 #include <pcl/search/kdtree.h>
@@ -123,6 +126,15 @@ std::optional<Table> cloud_table(const Cloud::ConstPtr& points, double band, dou
 }
 
 }  // namespace
+
+void write_cloud(const Cloud& cloud, const std::string& path) {
+  pcl::PCLPointCloud2 blob;
+  pcl::toPCLPointCloud2(cloud, blob);
+  std::ostringstream bytes;
+  pcl::PCDWriter writer;
+  if (writer.writeBinaryCompressed(bytes, blob) != 0) throw InputError(path + ": PCL cannot write these points");
+  write_file(path, bytes.str());
+}
 
 Cloud to_cloud(const DepthImage& depth, const Camera& camera) {
   check_image_size(depth.width, depth.height, camera);

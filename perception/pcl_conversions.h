@@ -22,6 +22,9 @@ using Cloud = pcl::PointCloud<pcl::PointXYZ>;  // camera frame (x right, y down,
 // if it is missing, neither .pcd nor .ply, damaged, or without points.
 Cloud read_cloud(const std::string& path);
 
+// A PCD file (binary_compressed), organised if the cloud is. Throws InputError naming the file if it cannot be written.
+void write_cloud(const Cloud& cloud, const std::string& path);
+
 // An organised cloud, one point a pixel; NaN where there is no reading.
 Cloud to_cloud(const DepthImage& depth, const Camera& camera);
 

@@ -40,7 +40,7 @@ double SdfGrid::operator()(const Eigen::Vector3d& point) const {
   return bottom + f.z() * (top - bottom) + (wanted - inside).norm() * spacing;
 }
 
-SdfGrid make_sdf_grid(const BoundingBox& box, const DistanceFunction& distance, const SdfGridOptions& options) {
+SdfGrid empty_sdf_grid(const BoundingBox& box, const SdfGridOptions& options) {
   if (options.nodes < 2 || !(options.margin >= 0.0)) throw std::invalid_argument("an SDF grid needs two nodes a side");
   const Eigen::Vector3d extent = box.max - box.min;
   const double margin = options.margin * extent.maxCoeff();
@@ -51,15 +51,22 @@ SdfGrid make_sdf_grid(const BoundingBox& box, const DistanceFunction& distance, 
   grid.size = ((padded / grid.spacing).array().ceil().cast<int>() + 1).max(2).matrix();
   // Centred, so that the grid is as symmetric as the solid.
   grid.origin = (box.min + box.max) / 2.0 - (grid.size.array() - 1).cast<double>().matrix() * grid.spacing / 2.0;
-  grid.values.reserve(static_cast<std::size_t>(grid.size.cast<long>().prod()));
-  for (int z = 0; z < grid.size.z(); ++z) {
-    for (int y = 0; y < grid.size.y(); ++y) {
-      for (int x = 0; x < grid.size.x(); ++x) {
-        grid.values.push_back(
-            static_cast<float>(distance(grid.origin + grid.spacing * Eigen::Vector3d(x, y, z))));
-      }
-    }
-  }
+  return grid;
+}
+
+std::vector<Eigen::Vector3d> node_positions(const SdfGrid& grid) {
+  std::vector<Eigen::Vector3d> positions;
+  positions.reserve(static_cast<std::size_t>(grid.size.cast<long>().prod()));
+  for (int z = 0; z < grid.size.z(); ++z)
+    for (int y = 0; y < grid.size.y(); ++y)
+      for (int x = 0; x < grid.size.x(); ++x)
+        positions.push_back(grid.origin + grid.spacing * Eigen::Vector3d(x, y, z));
+  return positions;
+}
+
+SdfGrid make_sdf_grid(const BoundingBox& box, const DistanceFunction& distance, const SdfGridOptions& options) {
+  SdfGrid grid = empty_sdf_grid(box, options);
+  for (const Eigen::Vector3d& p : node_positions(grid)) grid.values.push_back(static_cast<float>(distance(p)));
   return grid;
 }
 

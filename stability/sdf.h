@@ -43,6 +43,11 @@ struct SdfGridOptions {
   double margin = 0.5;  // of the longest side of the bounding box, added on every side
 };
 
+// The grid around a box, and where its nodes are, in the order of their values; values are empty. Throws
+// std::invalid_argument on fewer than two nodes or a box without extent.
+SdfGrid empty_sdf_grid(const BoundingBox& box, const SdfGridOptions& options = {});
+std::vector<Eigen::Vector3d> node_positions(const SdfGrid& grid);
+
 using DistanceFunction = std::function<double(const Eigen::Vector3d&)>;
 SdfGrid make_sdf_grid(const BoundingBox& box, const DistanceFunction& distance, const SdfGridOptions& options = {});
 
