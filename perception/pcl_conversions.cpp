@@ -13,6 +13,8 @@
 #include <pcl/search/kdtree.h>
 #include <pcl/segmentation/extract_clusters.h>
 
+#include "stability/files.h"
+
 namespace dofusion {
 namespace {
 
