@@ -249,6 +249,7 @@ ScanResult scan_scenes(const ScanJob& job) {
     settings["count"] = scenes.scenes.size();
     settings["scenes"] = fingerprint(scenes);
   }
+  if (is_new(job)) SceneGenerator{generation};  // bad settings throw before there is a folder
   ScanFolder folder(job.out, settings);
   try {
     if (is_new(job)) {

@@ -80,11 +80,24 @@ std::vector<std::vector<ViewLabel>> group_labels(const LabelPoints& points, doub
   return groups;
 }
 
+bool is_own(const std::vector<ViewLabel>& own, const ViewLabel& label) {
+  return std::any_of(own.begin(), own.end(),
+                     [&](const ViewLabel& other) { return other.view == label.view && other.label == label.label; });
+}
+
 // The pixels around a cluster in one view; empty if the view does not show it.
-PixelWindow window_of(const View& view, const LabelPoints& points, const std::vector<ViewLabel>& own) {
+PixelWindow window_of(const View& view, std::size_t index, const LabelPoints& points,
+                      const std::vector<ViewLabel>& own) {
   PixelWindow window{view.camera.width, view.camera.height, 0, 0, 1};
   const Pose T_camera_world = view.T_world_camera.inverse();
+  for (int v = 0; v < view.labels.height; ++v) {
+    for (int u = 0; u < view.labels.width; ++u) {
+      if (!is_own(own, {index, view.labels.at(v, u)})) continue;
+      window = {std::min(window.u0, u), std::min(window.v0, v), std::max(window.u1, u), std::max(window.v1, v), 1};
+    }
+  }
   for (const ViewLabel& label : own) {
+    if (label.view == index) continue;  // what other views see
     for (const Eigen::Vector3d& p_world : points.at(label)) {
       const Eigen::Vector3d p = T_camera_world * p_world;
       if (p.z() < 0.01) continue;
@@ -136,16 +149,13 @@ Cluster make_cluster(const std::vector<View>& views, const std::vector<PreparedV
                      const std::vector<ObjectModel>& models, const LabelPoints& points,
                      const std::vector<ViewLabel>& own) {
   Cluster cluster;
-  const std::vector<Eigen::Vector3d>& nearby = points.at(*std::min_element(own.begin(), own.end()));
+  const std::vector<Eigen::Vector3d>& nearby = points.at(own.front());
   for (std::size_t i = 0; i < views.size(); ++i) {
     const View& view = views[i];
     ClusterView seen{&view.depth, &prepared[i].face_map, view.camera, view.T_world_camera, {}, {}};
-    seen.window = window_of(view, points, own);
+    seen.window = window_of(view, i, points, own);
     for (const auto& [label, unused] : points) {
-      const bool is_own = std::any_of(own.begin(), own.end(), [&key = label](const ViewLabel& other) {
-        return other.view == key.view && other.label == key.label;
-      });
-      if (label.view == i && !is_own) seen.other_labels.push_back(label.label);
+      if (label.view == i && !is_own(own, label)) seen.other_labels.push_back(label.label);
     }
     add_view(view.depth, view.camera, table_of(view), view.labels, seen.window, prepared[i].sigma,
              coarse_stride(models, view.camera, nearby, view.T_world_camera), seen.other_labels, cluster.pyramid);

@@ -1,5 +1,4 @@
 #include "perception/pcl_conversions.h"
-#include "stability/files.h"
 
 #include <algorithm>
 #include <cmath>
