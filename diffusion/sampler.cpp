@@ -25,6 +25,7 @@ struct Walk {
   std::vector<CloudShapePtr> shapes;  // the query first
   std::vector<Pose> poses;            // T_world_object
   Eigen::Vector2d centre;
+  std::vector<PoseCostPtr> guides;
   double length = 1.0;
   Rng rng;
 };
@@ -56,6 +57,7 @@ Walk begin(const PlacementProblem& problem, double sigma, ShapeCache& cache) {
   Walk walk;
   walk.rng = make_rng(problem.seed, 0x706c616365u);
   walk.centre = problem.centre;
+  walk.guides = problem.guides;
   walk.shapes.push_back(cache.get(problem.query));
   std::vector<double> volumes{problem.query->volume};
   for (const ObjectPtr& object : problem.context.objects) {
@@ -100,8 +102,9 @@ struct PlacementModel::Impl {
       const Vector6 predicted = Eigen::Map<const Eigen::Matrix<float, 6, 1>>(output.data() + 6 * i).cast<double>();
       Walk& walk = walks[i];
       const bool paper = config.preset == Preset::kPaper;
-      const Pose clean = paper ? remove_body_noise(walk.poses[0], sigma * predicted, walk.length)
-                               : apply_world_residual(walk.poses[0], predicted, sigma, walk.length);
+      Pose clean = paper ? remove_body_noise(walk.poses[0], sigma * predicted, walk.length)
+                         : apply_world_residual(walk.poses[0], predicted, sigma, walk.length);
+      if (!walk.guides.empty()) clean = guided(walk.guides, clean, sigma * walk.length, rotation_scale(sigma));
       if (next <= 0) {
         walk.poses[0] = clean;
       } else if (paper) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "diffusion/config.h"
+#include "diffusion/guidance.h"
 #include "stability/scene.h"
 
 namespace dofusion {
@@ -19,6 +20,8 @@ struct PlacementProblem {
   std::uint64_t seed = 0;                            // all randomness of this problem
   Eigen::Vector2d centre = Eigen::Vector2d::Zero();  // where in x, y the noise is centred at the start, metres
   std::optional<Pose> start;  // begin at this pose plus noise of SamplerOptions::start_sigma instead of from noise
+  std::vector<PoseCostPtr> guides;  // wishes; after every step the clean pose goes towards them, the less the smaller
+                                    // the noise is
 };
 
 // Mean position of the context's objects; zero without any.

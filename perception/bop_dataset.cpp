@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "perception/depth_io.h"
+#include "perception/pcl_conversions.h"
 #include "stability/files.h"
 
 namespace dofusion {
@@ -18,6 +19,9 @@ namespace fs = std::filesystem;
 
 constexpr double kMillimetres = 1000.0;  // in a metre
 constexpr std::uint8_t kMasked = 255;
+constexpr char kRecords[] = "records";              // folder of what the JSON files will say of each image
+constexpr char kLastFile[] = "scene_gt_info.json";  // of a scene
+constexpr char kInside[] = "inside";                // pixels of the silhouette in the image; in the records alone
 
 std::string number_name(int number) {
   char text[16];
@@ -29,36 +33,6 @@ void make_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) throw InputError(folder.string() + ": cannot be created: " + error.message());
-}
-
-std::string to_ply_mm(const TriangleMesh& mesh) {
-  std::string text = "ply\nformat ascii 1.0\nelement vertex " + std::to_string(mesh.vertices.size()) +
-                     "\nproperty float x\nproperty float y\nproperty float z\nelement face " +
-                     std::to_string(mesh.triangles.size()) + "\nproperty list uchar int vertex_indices\nend_header\n";
-  char line[96];
-  for (const Eigen::Vector3d& v : mesh.vertices) {
-    const Eigen::Vector3d mm = kMillimetres * v;
-    std::snprintf(line, sizeof line, "%.9g %.9g %.9g\n", mm.x(), mm.y(), mm.z());
-    text += line;
-  }
-  for (const Eigen::Vector3i& t : mesh.triangles) {
-    std::snprintf(line, sizeof line, "3 %d %d %d\n", t[0], t[1], t[2]);
-    text += line;
-  }
-  return text;
-}
-
-Json model_info(const Object& object) {
-  const BoundingBox box = bounding_box(object.mesh);
-  const Eigen::Vector3d min = kMillimetres * box.min, size = kMillimetres * (box.max - box.min);
-  return {{"diameter", kMillimetres * object.diameter},
-          {"min_x", min.x()},
-          {"min_y", min.y()},
-          {"min_z", min.z()},
-          {"size_x", size.x()},
-          {"size_y", size.y()},
-          {"size_z", size.z()},
-          {"name", object.name}};
 }
 
 Json rotation_json(const Pose& pose) {
@@ -101,6 +75,16 @@ PixelBox projected_box(const Object& object, const Pose& T_camera_object, const 
   return box;
 }
 
+// Per object, 255 where it is what the camera sees.
+std::vector<LabelImage> visible_parts(const LabelImage& labels, std::size_t objects) {
+  std::vector<LabelImage> parts(objects, LabelImage(labels.width, labels.height));
+  for (std::size_t p = 0; p < labels.pixels.size(); ++p) {
+    const std::size_t object = labels.pixels[p] - std::size_t{kLabelFirstObject};
+    if (object < objects) parts[object].pixels[p] = kMasked;
+  }
+  return parts;
+}
+
 ScannerOptions without_table() {
   ScannerOptions options;
   options.table = false;
@@ -111,119 +95,146 @@ ScannerOptions without_table() {
 
 std::string bop_scene_name(int scene) { return number_name(scene); }
 
-void write_bop_models(const std::vector<ObjectPtr>& models, const Camera& camera, const fs::path& dataset) {
-  make_folder(dataset / "models");
-  Json info = Json::object();
-  for (std::size_t i = 0; i < models.size(); ++i) {
-    const int id = static_cast<int>(i) + 1;
-    info[std::to_string(id)] = model_info(*models[i]);
-    write_file(dataset / "models" / ("obj_" + number_name(id) + ".ply"), to_ply_mm(models[i]->mesh));
-  }
-  write_file(dataset / "models" / "models_info.json", info.dump(1) + "\n");
-  write_camera(camera, (dataset / "camera.json").string());
-}
-
 struct BopSceneWriter::Impl {
   Scene scene;
   std::vector<int> model_ids;
-  Camera camera;
   fs::path folder;
+  bool clouds = false;
   std::vector<Scanner> alone;  // per object, without anything that could hide it
-  int images = 0;
-  Json cameras = Json::object(), truth = Json::object(), info = Json::object();
 
   std::string file(const char* kind, const std::string& name) const {
     return (folder / kind / (name + ".png")).string();
   }
-  void write_masks(int object, const SyntheticView& view, const std::string& image, Json& image_info);
+  Json write_masks(int object, const Camera& camera, const SyntheticView& view, const LabelImage& visible,
+                   const std::string& image);
 };
 
-BopSceneWriter::BopSceneWriter(const Scene& scene, const std::vector<int>& model_ids, const Camera& camera,
-                               const fs::path& folder)
+BopSceneWriter::BopSceneWriter(const Scene& scene, const std::vector<int>& model_ids, const fs::path& folder,
+                               bool clouds)
     : impl_(std::make_unique<Impl>()) {
   if (model_ids.size() != scene.objects.size())
     throw std::invalid_argument(std::to_string(model_ids.size()) + " model ids for " +
                                 std::to_string(scene.objects.size()) + " objects");
   impl_->scene = scene;
   impl_->model_ids = model_ids;
-  impl_->camera = camera;
   impl_->folder = folder;
+  impl_->clouds = clouds;
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
     impl_->alone.emplace_back(std::vector<ObjectPtr>{scene.objects[i]}, without_table());
     impl_->alone.back().set_poses({scene.T_world_object[i]});
   }
-  for (const char* kind : {"rgb", "depth", "mask", "mask_visib"}) make_folder(folder / kind);
+  for (const char* kind : {"rgb", "depth", "mask", "mask_visib", kRecords}) make_folder(folder / kind);
+  if (clouds) make_folder(folder / "pcd");
 }
 
 BopSceneWriter::~BopSceneWriter() = default;
 
-void BopSceneWriter::add(const SyntheticView& view, const ColourImage& rgb) {
+void BopSceneWriter::add(int image, const Camera& c, const SyntheticView& view, const ColourImage& rgb) {
   Impl& impl = *impl_;
-  const std::string image = number_name(impl.images), key = std::to_string(impl.images);
-  write_depth(view.depth, impl.camera, impl.file("depth", image));
-  write_picture(rgb, impl.file("rgb", image));
+  const std::string name = number_name(image);
+  write_depth(view.depth, c, impl.file("depth", name));
+  write_picture(rgb, impl.file("rgb", name));
+  if (impl.clouds) write_cloud(to_cloud(view.depth, c), (impl.folder / "pcd" / (name + ".pcd")).string());
 
-  const Camera& c = impl.camera;
   const Pose T_camera_world = view.T_world_camera.inverse();
-  impl.cameras[key] = {{"cam_K", {c.fx, 0.0, c.cx, 0.0, c.fy, c.cy, 0.0, 0.0, 1.0}},
-                       {"depth_scale", c.depth_scale},
-                       {"cam_R_w2c", rotation_json(T_camera_world)},
-                       {"cam_t_w2c", translation_mm_json(T_camera_world)}};
-  Json truth = Json::array(), info = Json::array();
-  for (std::size_t i = 0; i < impl.scene.objects.size(); ++i) {
+  Json record;
+  record["camera"] = {{"cam_K", {c.fx, 0.0, c.cx, 0.0, c.fy, c.cy, 0.0, 0.0, 1.0}},
+                      {"depth_scale", c.depth_scale},
+                      {"cam_R_w2c", rotation_json(T_camera_world)},
+                      {"cam_t_w2c", translation_mm_json(T_camera_world)}};
+  const std::size_t objects = impl.scene.objects.size();
+  std::vector<LabelImage> visible = visible_parts(view.truth.labels, objects);
+  record["truth"] = Json::array();
+  record["info"] = Json::array();
+  for (std::size_t i = 0; i < objects; ++i) {
     const Pose T_camera_object = T_camera_world * impl.scene.T_world_object[i];
-    truth.push_back({{"cam_R_m2c", rotation_json(T_camera_object)},
-                     {"cam_t_m2c", translation_mm_json(T_camera_object)},
-                     {"obj_id", impl.model_ids[i]}});
-    impl.write_masks(static_cast<int>(i), view, image, info);
+    record["truth"].push_back({{"cam_R_m2c", rotation_json(T_camera_object)},
+                               {"cam_t_m2c", translation_mm_json(T_camera_object)},
+                               {"obj_id", impl.model_ids[i]}});
+    record["info"].push_back(impl.write_masks(static_cast<int>(i), c, view, visible[i], name));
   }
-  impl.truth[key] = std::move(truth);
-  impl.info[key] = std::move(info);
-  ++impl.images;
+  write_file(impl.folder / kRecords / (name + ".json"), record.dump());
 }
 
 // As in BOP, silhouette and its box and count go on beyond the image (up to one image), masks end with it.
-void BopSceneWriter::Impl::write_masks(int object, const SyntheticView& view, const std::string& image,
-                                       Json& image_info) {
+Json BopSceneWriter::Impl::write_masks(int object, const Camera& camera, const SyntheticView& view,
+                                       const LabelImage& visible, const std::string& image) {
   const auto i = static_cast<std::size_t>(object);
   const Pose T_camera_object = view.T_world_camera.inverse() * scene.T_world_object[i];
   const PixelBox window = projected_box(*scene.objects[i], T_camera_object, camera);
   const Scan silhouette =
       alone[i].render_window(camera, view.T_world_camera, window.u0, window.v0, window.u1 + 1, window.v1 + 1);
-  LabelImage mask(camera.width, camera.height), visible(camera.width, camera.height);
+  LabelImage mask(camera.width, camera.height);
   PixelBox box, visible_box;
-  int all = 0, valid = 0, seen = 0;
+  int all = 0, valid = 0, seen = 0, inside = 0;
   for (int row = 0; row < silhouette.labels.height; ++row)
     for (int column = 0; column < silhouette.labels.width; ++column) {
-      if (silhouette.labels.at(row, column) == kLabelNothing) continue;
       const int u = window.u0 + column, v = window.v0 + row;
+      const bool in_image = mask.contains(v, u), is_seen = in_image && visible.at(v, u) != 0;
+      // Rays that graze the outline may hit in one scan and miss in the other: what is seen is part of the silhouette.
+      if (silhouette.labels.at(row, column) == kLabelNothing && !is_seen) continue;
       ++all;
       box.add(u, v);
-      if (!mask.contains(v, u)) continue;
+      if (!in_image) continue;
+      ++inside;
       mask.at(v, u) = kMasked;
       valid += view.depth.at(v, u) > 0.0f;
-    }
-  for (int v = 0; v < camera.height; ++v)
-    for (int u = 0; u < camera.width; ++u) {
-      if (view.truth.labels.at(v, u) != kLabelFirstObject + object) continue;
-      visible.at(v, u) = kMasked;
+      if (!is_seen) continue;
       visible_box.add(u, v);
       ++seen;
     }
   write_labels(mask, file("mask", image + "_" + number_name(object)));
   write_labels(visible, file("mask_visib", image + "_" + number_name(object)));
-  image_info.push_back({{"bbox_obj", box.json()},
-                        {"bbox_visib", visible_box.json()},
-                        {"px_count_all", all},
-                        {"px_count_valid", valid},
-                        {"px_count_visib", seen},
-                        {"visib_fract", all > 0 ? static_cast<double>(seen) / all : 0.0}});
+  return {{"bbox_obj", box.json()}, {"bbox_visib", visible_box.json()},
+          {"px_count_all", all},    {"px_count_valid", valid},
+          {"px_count_visib", seen}, {"visib_fract", all > 0 ? static_cast<double>(seen) / all : 0.0},
+          {kInside, inside}};
 }
 
-void BopSceneWriter::finish() {
-  write_file(impl_->folder / "scene_camera.json", impl_->cameras.dump(1) + "\n");
-  write_file(impl_->folder / "scene_gt.json", impl_->truth.dump(1) + "\n");
-  write_file(impl_->folder / "scene_gt_info.json", impl_->info.dump(1) + "\n");
+namespace {
+
+void write_scene_files(const fs::path& folder, int images, const Scene& scene) {
+  Json cameras = Json::object(), truth = Json::object(), info = Json::object();
+  std::vector<bool> inside(scene.objects.size(), false);  // of any image
+  for (int image = 0; image < images; ++image) {
+    const fs::path file = folder / kRecords / (number_name(image) + ".json");
+    Json record = Json::parse(read_file(file), nullptr, false);
+    if (record.is_discarded() || record.value("info", Json::array()).size() != scene.objects.size())
+      throw InputError(file.string() + ": is damaged; delete it and give the same command again");
+    const std::string key = std::to_string(image);
+    cameras[key] = std::move(record["camera"]);
+    truth[key] = std::move(record["truth"]);
+    for (std::size_t i = 0; i < inside.size(); ++i) {
+      Json& object = record["info"][i];
+      if (object[kInside].get<int>() > 0) inside[i] = true;
+      object.erase(kInside);
+    }
+    info[key] = std::move(record["info"]);
+  }
+  const auto unseen = std::find(inside.begin(), inside.end(), false);
+  if (unseen != inside.end()) {
+    const auto i = static_cast<std::size_t>(unseen - inside.begin());
+    throw UnusableScene("object " + std::to_string(i) + " (" + scene.objects[i]->name + ") lies outside " +
+                        (images == 1 ? "the image" : "all " + std::to_string(images) + " images") +
+                        "; look from farther away or with more cameras");
+  }
+  write_file(folder / "scene_camera.json", cameras.dump(1) + "\n");
+  write_file(folder / "scene_gt.json", truth.dump(1) + "\n");
+  write_file(folder / kLastFile, info.dump(1) + "\n");
+}
+
+}  // namespace
+
+bool has_bop_image(const fs::path& folder, int image) {
+  std::error_code error;
+  return fs::exists(folder / kLastFile, error) || fs::exists(folder / kRecords / (number_name(image) + ".json"), error);
+}
+
+void finish_bop_scene(const fs::path& folder, int images, const Scene& scene) {
+  std::error_code error;
+  if (!fs::exists(folder / kLastFile, error)) write_scene_files(folder, images, scene);
+  fs::remove_all(folder / kRecords, error);
+  if (error) throw InputError((folder / kRecords).string() + ": cannot be removed: " + error.message());
 }
 
 }  // namespace dofusion

@@ -41,10 +41,10 @@ std::vector<Candidate> best_distinct(std::vector<Candidate> candidates, const st
 // One level of the pyramid with a scorer for each thread.
 class Level {
  public:
-  Level(const std::vector<ObjectModel>& models, const Observation& observation, const Explanation& explanation,
-        const std::vector<PlacedObject>& objects, double penetration, int threads)
+  Level(const std::vector<ObjectModel>& models, const std::vector<Observation>& observations,
+        const Explanation& explanation, const std::vector<PlacedObject>& objects, double penetration, int threads)
       : models_(models), explanation_(explanation), objects_(objects), penetration_(penetration) {
-    for (int i = 0; i < threads; ++i) scorers_.emplace_back(observation);
+    for (int i = 0; i < threads; ++i) scorers_.emplace_back(observations);
   }
 
   double gain(int worker, const PlacedObject& placed) {
@@ -81,23 +81,27 @@ void improve_all(std::vector<Candidate>& candidates, int threads, const Improve&
 
 }  // namespace
 
-ObservationPyramid observe_pyramid(const DepthImage& depth, const Camera& camera, const Table& table,
-                                   const LabelImage& labels, const PixelWindow& window, const DepthSigma& sigma,
-                                   int coarse_stride) {
+void add_view(const DepthImage& depth, const Camera& camera, const Table& table, const LabelImage& labels,
+              const PixelWindow& window, const DepthSigma& sigma, int coarse_stride,
+              const std::vector<std::uint8_t>& ignored, ObservationPyramid& pyramid) {
   const auto level = [&](int stride, double extra_sigma) {
     PixelWindow at = window;
     at.stride = std::max(1, stride);
     DepthSigma lenient = sigma;
     lenient.constant += extra_sigma;
-    return observe(depth, camera, table, labels, at, lenient);
+    Observation seen = observe(depth, camera, table, labels, at, lenient);
+    ignore_labels(ignored, seen);
+    return seen;
   };
-  return {level(coarse_stride, 0.005), level((coarse_stride + 1) / 2, 0.0015), level(1, 0.0)};
+  pyramid.coarse.push_back(level(coarse_stride, 0.005));
+  pyramid.medium.push_back(level((coarse_stride + 1) / 2, 0.0015));
+  pyramid.fine.push_back(level(1, 0.0));
 }
 
 PyramidScene explain(const ObservationPyramid& pyramid, const std::vector<ObjectModel>& models,
                      const std::vector<PlacedObject>& placed) {
-  const auto on_level = [&](const Observation& observation) {
-    PoseScorer scorer(observation);
+  const auto on_level = [&](const std::vector<Observation>& observations) {
+    PoseScorer scorer(observations);
     Explanation scene = scorer.empty_scene();
     for (const PlacedObject& object : placed) {
       scorer.add(models[object.model].object->mesh, object.T_world_object, scene);
@@ -121,8 +125,9 @@ std::vector<Candidate> find_candidates(const std::vector<ObjectModel>& models, c
   for (const PoseHypothesis& guess : hypotheses) {
     candidates.push_back({{guess.model, guess.T_world_object, guess.freedom}, 0.0});
   }
-  const auto level = [&](const Observation& observation, const Explanation& explanation, double leniency) {
-    return Level(models, observation, explanation, scene.objects, leniency * options.penetration, options.threads);
+  const auto level = [&](const std::vector<Observation>& observations, const Explanation& explanation,
+                         double leniency) {
+    return Level(models, observations, explanation, scene.objects, leniency * options.penetration, options.threads);
   };
   Level coarse = level(pyramid.coarse, scene.coarse, 6.0), medium = level(pyramid.medium, scene.medium, 3.0),
         fine = level(pyramid.fine, scene.fine, 1.0);

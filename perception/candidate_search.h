@@ -10,12 +10,13 @@ namespace dofusion {
 
 // The same window seen coarsely and with lenient noise first, for the many guesses, and exactly at last.
 struct ObservationPyramid {
-  Observation coarse, medium, fine;
+  std::vector<Observation> coarse, medium, fine;  // one for each view
 };
 
-ObservationPyramid observe_pyramid(const DepthImage& depth, const Camera& camera, const Table& table,
-                                   const LabelImage& labels, const PixelWindow& window, const DepthSigma& sigma,
-                                   int coarse_stride);
+// Adds what one more camera saw. Pixels with `ignored` labels say nothing.
+void add_view(const DepthImage& depth, const Camera& camera, const Table& table, const LabelImage& labels,
+              const PixelWindow& window, const DepthSigma& sigma, int coarse_stride,
+              const std::vector<std::uint8_t>& ignored, ObservationPyramid& pyramid);
 
 // The scene that already stands, as every level explains it.
 struct PyramidScene {

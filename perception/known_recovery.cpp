@@ -23,15 +23,27 @@ SceneSearchOptions search_options(const KnownRecoveryOptions& options) {
   return search;
 }
 
+// A label of one view.
+struct ViewLabel {
+  std::size_t view = 0;
+  std::uint8_t label = 0;
+  bool operator<(const ViewLabel& other) const {
+    return std::make_pair(view, label) < std::make_pair(other.view, other.label);
+  }
+};
+using LabelPoints = std::map<ViewLabel, std::vector<Eigen::Vector3d>>;
+
 // Some of each label's readings, in the world.
-std::map<int, std::vector<Eigen::Vector3d>> thinned_points(const DepthImage& depth, const Camera& camera,
-                                                           const Pose& T_world_camera, const LabelImage& labels) {
-  std::map<int, std::vector<Eigen::Vector3d>> points;
-  for (int v = 0; v < depth.height; v += 3) {
-    for (int u = 0; u < depth.width; u += 3) {
-      const int label = labels.at(v, u);
-      if (label < kLabelFirstObject || !is_valid_depth(depth.at(v, u))) continue;
-      points[label].push_back(T_world_camera * unproject(camera, u, v, depth.at(v, u)));
+LabelPoints thinned_points(const std::vector<View>& views) {
+  LabelPoints points;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const View& view = views[i];
+    for (int v = 0; v < view.depth.height; v += 3) {
+      for (int u = 0; u < view.depth.width; u += 3) {
+        const std::uint8_t label = view.labels.at(v, u);
+        if (label < kLabelFirstObject || !is_valid_depth(view.depth.at(v, u))) continue;
+        points[{i, label}].push_back(view.T_world_camera * unproject(view.camera, u, v, view.depth.at(v, u)));
+      }
     }
   }
   return points;
@@ -47,14 +59,13 @@ bool within(const std::vector<Eigen::Vector3d>& a, const std::vector<Eigen::Vect
 }
 
 // Labels whose readings come near each other, directly or through others.
-std::vector<std::vector<std::uint8_t>> group_labels(const std::map<int, std::vector<Eigen::Vector3d>>& points,
-                                                    double distance) {
-  std::vector<std::vector<std::uint8_t>> groups;
+std::vector<std::vector<ViewLabel>> group_labels(const LabelPoints& points, double distance) {
+  std::vector<std::vector<ViewLabel>> groups;
   for (const auto& [label, own] : points) {
-    std::vector<std::uint8_t> joined = {static_cast<std::uint8_t>(label)};
-    std::vector<std::vector<std::uint8_t>> apart;
-    for (std::vector<std::uint8_t>& group : groups) {
-      const bool near = std::any_of(group.begin(), group.end(), [&, &points_of_label = own](std::uint8_t other) {
+    std::vector<ViewLabel> joined = {label};
+    std::vector<std::vector<ViewLabel>> apart;
+    for (std::vector<ViewLabel>& group : groups) {
+      const bool near = std::any_of(group.begin(), group.end(), [&, &points_of_label = own](const ViewLabel& other) {
         return within(points_of_label, points.at(other), distance);
       });
       if (near) {
@@ -69,32 +80,38 @@ std::vector<std::vector<std::uint8_t>> group_labels(const std::map<int, std::vec
   return groups;
 }
 
-PixelWindow window_of(const LabelImage& labels, const std::vector<std::uint8_t>& own) {
-  PixelWindow window{labels.width, labels.height, 0, 0, 1};
-  for (int v = 0; v < labels.height; ++v) {
-    for (int u = 0; u < labels.width; ++u) {
-      if (std::find(own.begin(), own.end(), labels.at(v, u)) == own.end()) continue;
+bool is_own(const std::vector<ViewLabel>& own, const ViewLabel& label) {
+  return std::any_of(own.begin(), own.end(),
+                     [&](const ViewLabel& other) { return other.view == label.view && other.label == label.label; });
+}
+
+// The pixels around a cluster in one view; empty if the view does not show it.
+PixelWindow window_of(const View& view, std::size_t index, const LabelPoints& points,
+                      const std::vector<ViewLabel>& own) {
+  PixelWindow window{view.camera.width, view.camera.height, 0, 0, 1};
+  const Pose T_camera_world = view.T_world_camera.inverse();
+  for (int v = 0; v < view.labels.height; ++v) {
+    for (int u = 0; u < view.labels.width; ++u) {
+      if (!is_own(own, {index, view.labels.at(v, u)})) continue;
       window = {std::min(window.u0, u), std::min(window.v0, v), std::max(window.u1, u), std::max(window.v1, v), 1};
     }
   }
-  return {std::max(0, window.u0 - kWindowMargin), std::max(0, window.v0 - kWindowMargin),
-          std::min(labels.width, window.u1 + 1 + kWindowMargin), std::min(labels.height, window.v1 + 1 + kWindowMargin),
-          1};
-}
-
-// All of a cluster but its faces and its pyramid.
-Cluster make_cluster(const DepthImage& depth, const Camera& camera, const Table& table, const LabelImage& labels,
-                     const std::map<int, std::vector<Eigen::Vector3d>>& points, const std::vector<std::uint8_t>& own) {
-  Cluster cluster;
-  cluster.depth = &depth;
-  cluster.camera = camera;
-  cluster.T_world_camera = table.T_world_camera;
-  cluster.window = window_of(labels, own);
-  for (const auto& [label, unused] : points) {
-    const bool is_own = std::find(own.begin(), own.end(), label) != own.end();
-    if (!is_own) cluster.other_labels.push_back(static_cast<std::uint8_t>(label));
+  for (const ViewLabel& label : own) {
+    if (label.view == index) continue;  // what other views see
+    for (const Eigen::Vector3d& p_world : points.at(label)) {
+      const Eigen::Vector3d p = T_camera_world * p_world;
+      if (p.z() < 0.01) continue;
+      const Eigen::Vector2d pixel = project(view.camera, p);
+      if (!(pixel.cwiseAbs().maxCoeff() < 1e6)) continue;
+      const int u = static_cast<int>(std::lround(pixel.x())), v = static_cast<int>(std::lround(pixel.y()));
+      window = {std::min(window.u0, u), std::min(window.v0, v), std::max(window.u1, u), std::max(window.v1, v), 1};
+    }
   }
-  return cluster;
+  window = {std::max(0, window.u0 - kWindowMargin), std::max(0, window.v0 - kWindowMargin),
+            std::min(view.camera.width, window.u1 + 1 + kWindowMargin),
+            std::min(view.camera.height, window.v1 + 1 + kWindowMargin), 1};
+  const bool is_seen = window.u0 < window.u1 && window.v0 < window.v1;
+  return is_seen ? window : PixelWindow{};
 }
 
 // So coarse that a typical object of the library still covers some hundred pixels.
@@ -117,8 +134,38 @@ FaceMap object_faces(const DepthImage& depth, const Camera& camera, const LabelI
   return find_faces(depth, camera, mask, {}, options);
 }
 
+// What recovery computes once for a view.
+struct PreparedView {
+  DepthSigma sigma;
+  FaceMap face_map;
+};
+
+PreparedView prepare(const View& view, const DepthSigma& prior) {
+  const DepthSigma sigma = calibrate_sigma(view.depth, view.camera, table_of(view), prior);
+  return {sigma, object_faces(view.depth, view.camera, view.labels, sigma)};
+}
+
+Cluster make_cluster(const std::vector<View>& views, const std::vector<PreparedView>& prepared,
+                     const std::vector<ObjectModel>& models, const LabelPoints& points,
+                     const std::vector<ViewLabel>& own) {
+  Cluster cluster;
+  const std::vector<Eigen::Vector3d>& nearby = points.at(own.front());
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const View& view = views[i];
+    ClusterView seen{&view.depth, &prepared[i].face_map, view.camera, view.T_world_camera, {}, {}};
+    seen.window = window_of(view, i, points, own);
+    for (const auto& [label, unused] : points) {
+      if (label.view == i && !is_own(own, label)) seen.other_labels.push_back(label.label);
+    }
+    add_view(view.depth, view.camera, table_of(view), view.labels, seen.window, prepared[i].sigma,
+             coarse_stride(models, view.camera, nearby, view.T_world_camera), seen.other_labels, cluster.pyramid);
+    cluster.views.push_back(std::move(seen));
+  }
+  return cluster;
+}
+
 // The label that most of the pixels have in which the patch is the nearest surface of its scene.
-int common_label(const Observation& seen, const Explanation& others, const RasterPatch& patch) {
+int common_label(const Observation& seen, const ViewExplanation& others, const RasterPatch& patch) {
   std::vector<int> votes(256, 0);
   for (int row = 0; row < patch.height; ++row) {
     for (int column = 0; column < patch.width; ++column) {
@@ -131,16 +178,20 @@ int common_label(const Observation& seen, const Explanation& others, const Raste
   return static_cast<int>(std::max_element(votes.begin(), votes.end()) - votes.begin());
 }
 
-// Share of a label's readings that the scene explains to 3 sigma. Blocks can fill a part of a foreign object without
-// contradicting any reading; what they leave gives them away.
-double explained_share(const Observation& seen, const Explanation& scene, int label) {
+struct ExplainedReadings {
   int readings = 0, explained = 0;
+};
+
+// How many of a label's readings the scene explains to 3 sigma. Blocks can fill a part of a foreign object without
+// contradicting any reading; what they leave gives them away.
+ExplainedReadings explained_readings(const Observation& seen, const ViewExplanation& scene, int label) {
+  ExplainedReadings count;
   for (std::size_t i = 0; i < seen.labels.pixels.size(); ++i) {
     if (seen.labels.pixels[i] != label || seen.depth.pixels[i] <= 0.0f) continue;
-    ++readings;
-    explained += scene.cost.pixels[i] < kExplainedCost;
+    ++count.readings;
+    count.explained += scene.cost.pixels[i] < kExplainedCost;
   }
-  return explained / std::max(1.0, 0.0 + readings);
+  return count;
 }
 
 // The recovered objects of a cluster's scene, those that explain too little left out.
@@ -165,9 +216,19 @@ std::vector<RecoveredObject> report(const std::vector<ObjectModel>& models, cons
     object.name = model.object->name;
     object.known = true;
     object.pixels = counts.explained;
-    object.label = common_label(scorer.observation(), others, scorer.render(model.object->mesh, object.T_world_object));
     object.score = counts.explained / std::max(1.0, 0.0 + counts.explained + counts.behind);
-    if (object.label > 0) object.score *= explained_share(cluster.pyramid.fine, scene, object.label);
+    ExplainedReadings total;
+    for (std::size_t k = 0; k < cluster.views.size(); ++k) {
+      ViewScorer& view = scorer.views()[k];
+      const int label =
+          common_label(view.observation(), others[k], view.render(model.object->mesh, object.T_world_object));
+      if (k == 0) object.label = label;
+      if (label == 0) continue;
+      const ExplainedReadings count = explained_readings(view.observation(), scene[k], label);
+      total.readings += count.readings;
+      total.explained += count.explained;
+    }
+    if (total.readings > 0) object.score *= static_cast<double>(total.explained) / total.readings;
     if (object.score < min_score) continue;
     result.push_back(object);
   }
@@ -179,26 +240,28 @@ std::vector<RecoveredObject> report(const std::vector<ObjectModel>& models, cons
 std::vector<RecoveredObject> recover_known(const DepthImage& depth, const Camera& camera, const Table& table,
                                            const LabelImage& labels, const std::vector<ObjectPtr>& library,
                                            const KnownRecoveryOptions& options) {
-  check_image_size(depth.width, depth.height, camera);
-  check_image_size(labels.width, labels.height, camera);
+  return recover_known({View{depth, camera, table.T_world_camera, labels}}, library, options);
+}
+
+std::vector<RecoveredObject> recover_known(const std::vector<View>& views, const std::vector<ObjectPtr>& library,
+                                           const KnownRecoveryOptions& options) {
+  if (views.empty()) throw std::invalid_argument("recover_known: no view");
+  for (const View& view : views) {
+    check_image_size(view.depth.width, view.depth.height, view.camera);
+    check_image_size(view.labels.width, view.labels.height, view.camera);
+  }
   if (library.empty()) throw std::invalid_argument("recover_known: the library has no object");
-  const auto points = thinned_points(depth, camera, table.T_world_camera, labels);
+  const LabelPoints points = thinned_points(views);
   if (points.empty()) return {};
   std::vector<ObjectModel> models;
   for (const ObjectPtr& object : library) models.emplace_back(object);
+  std::vector<PreparedView> prepared;
+  for (const View& view : views) prepared.push_back(prepare(view, options.sigma));
 
-  const DepthSigma sigma = calibrate_sigma(depth, camera, table, options.sigma);
-  const FaceMap face_map = object_faces(depth, camera, labels, sigma);
   const SceneSearchOptions search = search_options(options);
   std::vector<RecoveredObject> recovered;
-  for (const std::vector<std::uint8_t>& own : group_labels(points, options.cluster_distance)) {
-    Cluster cluster = make_cluster(depth, camera, table, labels, points, own);
-    cluster.face_map = &face_map;
-    cluster.pyramid = observe_pyramid(depth, camera, table, labels, cluster.window, sigma,
-                                      coarse_stride(models, camera, points.at(own.front()), table.T_world_camera));
-    for (Observation* level : {&cluster.pyramid.coarse, &cluster.pyramid.medium, &cluster.pyramid.fine}) {
-      ignore_labels(cluster.other_labels, *level);
-    }
+  for (const std::vector<ViewLabel>& own : group_labels(points, options.cluster_distance)) {
+    const Cluster cluster = make_cluster(views, prepared, models, points, own);
     const std::vector<SceneHypothesis> scenes = search_scenes(models, cluster, search);
     const SceneHypothesis chosen = options.settle ? choose_settled(models, cluster, scenes, search.costs,
                                                                    {options.settle_distance, options.settle_angle})

@@ -5,6 +5,7 @@
 
 #include "perception/recovery.h"
 #include "perception/table.h"
+#include "perception/views.h"
 
 namespace dofusion {
 
@@ -31,6 +32,14 @@ struct KnownRecoveryOptions {
 // of the camera's size or the library is empty.
 std::vector<RecoveredObject> recover_known(const DepthImage& depth, const Camera& camera, const Table& table,
                                            const LabelImage& labels, const std::vector<ObjectPtr>& library,
+                                           const KnownRecoveryOptions& options = {});
+
+// The same from several views of one scene together (on_common_table() gives them their common world): candidates come
+// from the view that shows most of what is not yet explained; every pose is scored, aligned and chosen by the pixels of
+// all views, so that views need not agree in their labels. `label` is that in the first view, 0 if the object is not
+// seen there; `pixels` and `score` count all views. An empty list if no view has a label above 1. Throws
+// std::invalid_argument as above, and without any view.
+std::vector<RecoveredObject> recover_known(const std::vector<View>& views, const std::vector<ObjectPtr>& library,
                                            const KnownRecoveryOptions& options = {});
 
 // Labels in the order of the recovered objects (2 + i for object i) where the reading is within 1 cm of what they would

@@ -88,4 +88,22 @@ ObjectView view_object(const DepthImage& depth, const Camera& camera, const Tabl
   return view;
 }
 
+ObjectView joined(const std::vector<ObjectView>& views) {
+  ObjectView all;
+  for (const ObjectView& view : views) {
+    if (view.points.empty()) continue;
+    all.label = view.label;
+    all.pixels += view.pixels;
+    all.points.insert(all.points.end(), view.points.begin(), view.points.end());
+    all.sigma.insert(all.sigma.end(), view.sigma.begin(), view.sigma.end());
+    all.faces.insert(all.faces.end(), view.faces.begin(), view.faces.end());
+  }
+  if (all.points.empty()) return all;
+  double sigma_sum = 0.0;
+  for (const double sigma : all.sigma) sigma_sum += sigma;
+  all.faces = merged(std::move(all.faces), 4.0 * sigma_sum / static_cast<double>(all.sigma.size()));
+  all.lowest = robust_range(all.points, Eigen::Vector3d::UnitZ()).low;
+  return all;
+}
+
 }  // namespace dofusion

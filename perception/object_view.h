@@ -1,4 +1,4 @@
-// What a depth image shows of one object, in the world frame.
+// What depth images show of one object, in the world frame.
 #pragma once
 
 #include <vector>
@@ -26,6 +26,9 @@ struct ObjectView {
 // The view of the object with `label`. Without a reading it has no points.
 ObjectView view_object(const DepthImage& depth, const Camera& camera, const Table& table, const LabelImage& labels,
                        int label, const FaceOptions& options);
+
+// One object seen by several cameras: the points of all, faces of one plane joined. Views without a point add nothing.
+ObjectView joined(const std::vector<ObjectView>& views);
 
 // The value below which a share of the values lies (0 … 1).
 double quantile(std::vector<double> values, double share);

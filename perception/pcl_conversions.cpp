@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <limits>
+#include <sstream>
 
 #include <Eigen/Dense>
+#include <pcl/conversions.h>
 #include <pcl/io/pcd_io.h>
-#include <pcl/io/ply_io.h>
 #include <pcl/sample_consensus/ransac.h>
 #include <pcl/sample_consensus/sac_model_plane.h>
 #include <pcl/search/kdtree.h>
@@ -77,7 +77,9 @@ std::optional<CloudView> virtual_view(const Cloud& cloud, int width) {
   // No more pixels than points, so that the image has few holes.
   const double shape = span.y() / span.x();
   const int columns = std::clamp(static_cast<int>(std::sqrt(0.7 * readings / shape)), 2, std::max(2, width));
-  const double focal = (columns - 1) / span.x();
+  // Not many more rows than columns either: a cloud like a needle would need millions.
+  const int most_rows = 4 * std::max(2, width);
+  const double focal = std::min((columns - 1) / span.x(), (most_rows - 2) / span.y());
   const int rows = static_cast<int>(std::ceil(focal * span.y())) + 1;
   CloudView view{{focal, focal, -focal * low.x(), -focal * low.y(), columns, rows, 1.0}, DepthImage(columns, rows)};
   for (const pcl::PointXYZ& p : cloud) {
@@ -91,15 +93,28 @@ std::optional<CloudView> virtual_view(const Cloud& cloud, int width) {
   return view;
 }
 
-// RANSAC and least squares by PCL, in space; the camera is at the origin, below no table.
-std::optional<Table> cloud_table(const Cloud::ConstPtr& points, double band) {
-  auto model = std::make_shared<pcl::SampleConsensusModelPlane<pcl::PointXYZ>>(points);
-  pcl::RandomSampleConsensus<pcl::PointXYZ> ransac(model, band);
+// Every n-th point, so that no more than so many remain.
+Cloud::Ptr thinned(const Cloud& cloud, std::size_t most) {
+  auto some = std::make_shared<Cloud>();
+  for (std::size_t i = 0; i < cloud.size(); i += cloud.size() / most + 1) some->push_back(cloud[i]);
+  return some;
+}
+
+// RANSAC on some of the points and least squares on all near the plane found, by PCL, in space; the camera is at the
+// origin, below no table.
+std::optional<Table> cloud_table(const Cloud::ConstPtr& points, double band, double min_share) {
+  constexpr std::size_t kMostRansacPoints = 6000;
+  constexpr int kIterations = 400;
+  pcl::RandomSampleConsensus<pcl::PointXYZ> ransac(
+      std::make_shared<pcl::SampleConsensusModelPlane<pcl::PointXYZ>>(thinned(*points, kMostRansacPoints)), band);
+  ransac.setMaxIterations(kIterations);
   if (!ransac.computeModel()) return std::nullopt;
   Eigen::VectorXf rough, fine;
   std::vector<int> inliers;
   ransac.getModelCoefficients(rough);
-  ransac.getInliers(inliers);
+  auto model = std::make_shared<pcl::SampleConsensusModelPlane<pcl::PointXYZ>>(points);
+  model->selectWithinDistance(rough, band, inliers);
+  if (static_cast<double>(inliers.size()) < min_share * static_cast<double>(points->size())) return std::nullopt;
   model->optimizeModelCoefficients(inliers, rough, fine);
   const Eigen::Vector3d normal = fine.head<3>().cast<double>();
   if (inliers.size() < 3 || std::abs(fine[3]) < 1e-6F) return std::nullopt;
@@ -114,16 +129,13 @@ std::optional<Table> cloud_table(const Cloud::ConstPtr& points, double band) {
 
 }  // namespace
 
-Cloud read_cloud(const std::string& path) {
-  Cloud cloud;
-  const std::string extension = std::filesystem::path(path).extension().string();
-  const bool pcd = extension == ".pcd", ply = extension == ".ply";
-  if (!pcd && !ply) throw InputError(path + ": not a .pcd or .ply file");
-  if (!std::filesystem::is_regular_file(path)) throw InputError(path + ": no such file");
-  const int status = pcd ? pcl::io::loadPCDFile(path, cloud) : pcl::io::loadPLYFile(path, cloud);
-  if (status < 0) throw InputError(path + ": cannot be read as a point cloud");
-  if (cloud.empty()) throw InputError(path + ": has no points");
-  return cloud;
+void write_cloud(const Cloud& cloud, const std::string& path) {
+  pcl::PCLPointCloud2 blob;
+  pcl::toPCLPointCloud2(cloud, blob);
+  std::ostringstream bytes;
+  pcl::PCDWriter writer;
+  if (writer.writeBinaryCompressed(bytes, blob) != 0) throw InputError(path + ": PCL cannot write these points");
+  write_file(path, bytes.str());
 }
 
 Cloud to_cloud(const DepthImage& depth, const Camera& camera) {
@@ -134,7 +146,9 @@ Cloud to_cloud(const DepthImage& depth, const Camera& camera) {
   for (int v = 0; v < depth.height; ++v) {
     for (int u = 0; u < depth.width; ++u) {
       if (!is_valid_depth(depth.at(v, u))) continue;
-      cloud.at(u, v).getVector3fMap() = unproject(camera, u, v, depth.at(v, u)).cast<float>();
+      // By index: PCL's at(column, row) refuses a cloud of one row.
+      cloud[static_cast<std::size_t>(v) * depth.width + u].getVector3fMap() =
+          unproject(camera, u, v, depth.at(v, u)).cast<float>();
     }
   }
   return cloud;
@@ -159,7 +173,7 @@ std::optional<CloudSegmentation> segment_cloud(const Cloud& cloud, const CloudSe
   }
   if (readings->size() < 3) return std::nullopt;
   const double band = options.table_band * sigma / static_cast<double>(readings->size());
-  const std::optional<Table> table = cloud_table(readings, band);
+  const std::optional<Table> table = cloud_table(readings, band, options.min_share);
   if (!table) return std::nullopt;
 
   CloudSegmentation result{*table, std::vector<std::uint8_t>(cloud.size(), kLabelNothing)};

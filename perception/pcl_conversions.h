@@ -18,8 +18,12 @@ namespace dofusion {
 
 using Cloud = pcl::PointCloud<pcl::PointXYZ>;  // camera frame (x right, y down, z forward), metres
 
-// A PCD or PLY file. Throws InputError naming the file if it cannot be read or has no points.
+// A PCD or PLY file (cloud_io.cpp, which looks at the header before PCL trusts it). Throws InputError naming the file
+// if it is missing, neither .pcd nor .ply, damaged, or without points.
 Cloud read_cloud(const std::string& path);
+
+// A PCD file (binary_compressed), organised if the cloud is. Throws InputError naming the file if it cannot be written.
+void write_cloud(const Cloud& cloud, const std::string& path);
 
 // An organised cloud, one point a pixel; NaN where there is no reading.
 Cloud to_cloud(const DepthImage& depth, const Camera& camera);
@@ -32,13 +36,14 @@ struct CloudView {
 
 // An organised cloud keeps its pixels, and its camera is found from the points; an unorganised one (or an organised one
 // that no pinhole camera explains) is seen from the origin by a camera of `width` pixels that spans it, the nearest
-// point counting in each pixel. Points that are not finite or not before the camera are left out; nullopt if fewer
-// than three remain.
+// point counting in each pixel; it has four times as many rows at most. Points that are not finite or not before the
+// camera are left out; nullopt if fewer than three remain.
 std::optional<CloudView> view_cloud(const Cloud& cloud, int width = 640);
 
 struct CloudSegmentationOptions {
   DepthSigma sigma;                 // of the points' depth
   double table_band = 3.0;          // sigmas; points nearer to the plane belong to the table
+  double min_share = 0.1;           // of the points that must lie on the table's plane
   double cluster_distance = 0.012;  // metres; points nearer to each other belong to one object
   int min_points = 50;              // of an object
 };

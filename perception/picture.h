@@ -6,6 +6,7 @@
 #include <string>
 
 #include "perception/camera.h"
+#include "perception/geom_scanner.h"
 #include "perception/image.h"
 #include "perception/scanner.h"
 
@@ -20,7 +21,7 @@ inline constexpr Rgb kQueryColour{240, 120, 20};
 inline constexpr Rgb kTableColour{205, 205, 202};
 
 struct PictureOptions {
-  int highlighted = -1;      // object drawn in the query's colour and outlined; -1 none
+  int highlighted = -1;      // object or body drawn in the query's colour and outlined; -1 none
   int shadow_samples = 16;   // rays a pixel towards the light, of 4 samples each; 0: no shadow
   int ambient_samples = 16;  // rays a pixel to the sky, as above; 0: no contact shading
 };
@@ -30,6 +31,11 @@ struct PictureOptions {
 ColourImage shaded_picture(const Scanner& scanner, const Camera& camera, const Pose& T_world_camera,
                            const PictureOptions& options = {});
 ColourImage shaded_picture(const Scene& scene, const Camera& camera, const Pose& T_world_camera,
+                           const PictureOptions& options = {});
+
+// The same of MuJoCo's geoms in their own colours; planes fade out. Everything is taken to be as large as what is in
+// the middle of the picture is far.
+ColourImage shaded_picture(const GeomScanner& scanner, const Camera& camera, const Pose& T_world_camera,
                            const PictureOptions& options = {});
 
 // Near is warm, far is cold; the colours span the 1st to the 99th percentile of the readings. No reading is black.

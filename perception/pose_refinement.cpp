@@ -29,14 +29,13 @@ std::vector<Eigen::Vector3d> triangle_normals(const TriangleMesh& mesh, const Ei
 
 // Sums over the pixels that see the object within the gate. Moving a surface point by d moves the depth along its
 // pixel's ray by n·d / n·ray.
-NormalEquations depth_equations(PoseScorer& scorer, const Explanation& scene, const TriangleMesh& mesh,
-                                const Pose& T_world_object, double gate) {
+void add_depth_equations(ViewScorer& scorer, const ViewExplanation& scene, const TriangleMesh& mesh,
+                         const Pose& T_world_object, double gate, NormalEquations& sums) {
   const RasterPatch& patch = scorer.render(mesh, T_world_object);
   const Observation& seen = scorer.observation();
   const Pose T_camera_object = seen.T_camera_world * T_world_object;
   const Eigen::Matrix3d R_world_camera = seen.T_camera_world.linear().transpose();
   const std::vector<Eigen::Vector3d> normals = triangle_normals(mesh, T_camera_object.linear());
-  NormalEquations sums;
   for (int row = 0; row < patch.height; ++row) {
     for (int column = 0; column < patch.width; ++column) {
       const std::size_t i = static_cast<std::size_t>(row) * patch.width + column;
@@ -56,6 +55,14 @@ NormalEquations depth_equations(PoseScorer& scorer, const Explanation& scene, co
       sums.H.selfadjointView<Eigen::Lower>().rankUpdate(J, weight);
       sums.g += weight * (reading - z) * J;
     }
+  }
+}
+
+NormalEquations depth_equations(PoseScorer& scorer, const Explanation& scene, const TriangleMesh& mesh,
+                                const Pose& T_world_object, double gate) {
+  NormalEquations sums;
+  for (std::size_t i = 0; i < scene.size(); ++i) {
+    add_depth_equations(scorer.views()[i], scene[i], mesh, T_world_object, gate, sums);
   }
   sums.H = Matrix6d(sums.H.selfadjointView<Eigen::Lower>());
   return sums;

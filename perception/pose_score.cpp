@@ -46,7 +46,7 @@ float reading_cost_at(const Observation& seen, std::size_t pixel, float scene, f
 
 // By how much N pixels of a patch lower the cost of the scene; 0 where the scene is nearer.
 template <int N>
-Pixels<N> gain_of_pixels(const Observation& seen, const Explanation& scene, std::size_t in_scene,
+Pixels<N> gain_of_pixels(const Observation& seen, const ViewExplanation& scene, std::size_t in_scene,
                          const RasterPatch& patch, std::size_t in_patch) {
   const Pixels<N> w = load<N>(&patch.inverse_depth[in_patch]);
   const Pixels<N> nearest = ((w * load<N>(&scene.depth.pixels[in_scene]) - 1.0f) * 1e7f).max(0.0f).min(1.0f);
@@ -115,12 +115,22 @@ void ignore_labels(const std::vector<std::uint8_t>& labels, Observation& observa
 
 double total_cost(const Explanation& explanation) {
   double sum = 0.0;
-  for (const float cost : explanation.cost.pixels) sum += cost;
+  for (const ViewExplanation& view : explanation) {
+    for (const float cost : view.cost.pixels) sum += cost;
+  }
   return sum;
 }
 
-Explanation PoseScorer::empty_scene() const {
-  Explanation scene;
+PixelCounts& PixelCounts::operator+=(const PixelCounts& other) {
+  explained += other.explained;
+  nearer += other.nearer;
+  behind += other.behind;
+  missing += other.missing;
+  return *this;
+}
+
+ViewExplanation ViewScorer::empty_scene() const {
+  ViewExplanation scene;
   scene.depth = observation_->background;
   scene.cost = Image<float>(scene.depth.width, scene.depth.height);
   for (std::size_t i = 0; i < scene.depth.pixels.size(); ++i) {
@@ -129,7 +139,7 @@ Explanation PoseScorer::empty_scene() const {
   return scene;
 }
 
-void PoseScorer::add(const TriangleMesh& mesh, const Pose& T_world_object, Explanation& scene) {
+void ViewScorer::add(const TriangleMesh& mesh, const Pose& T_world_object, ViewExplanation& scene) {
   const RasterPatch& patch = render(mesh, T_world_object);
   for (int row = 0; row < patch.height; ++row) {
     for (int column = 0; column < patch.width; ++column) {
@@ -143,7 +153,7 @@ void PoseScorer::add(const TriangleMesh& mesh, const Pose& T_world_object, Expla
   }
 }
 
-double PoseScorer::gain(const Explanation& scene, const TriangleMesh& mesh, const Pose& T_world_object) {
+double ViewScorer::gain(const ViewExplanation& scene, const TriangleMesh& mesh, const Pose& T_world_object) {
   constexpr int kSideBySide = 8;
   const RasterPatch& patch = render(mesh, T_world_object);
   Pixels<kSideBySide> sums = Pixels<kSideBySide>::Zero();
@@ -161,7 +171,7 @@ double PoseScorer::gain(const Explanation& scene, const TriangleMesh& mesh, cons
   return sums.cast<double>().sum();
 }
 
-PixelCounts PoseScorer::count(const Explanation& scene, const TriangleMesh& mesh, const Pose& T_world_object) {
+PixelCounts ViewScorer::count(const ViewExplanation& scene, const TriangleMesh& mesh, const Pose& T_world_object) {
   const RasterPatch& patch = render(mesh, T_world_object);
   PixelCounts counts;
   for (int row = 0; row < patch.height; ++row) {
@@ -181,6 +191,34 @@ PixelCounts PoseScorer::count(const Explanation& scene, const TriangleMesh& mesh
     }
   }
   return counts;
+}
+
+Explanation PoseScorer::empty_scene() const {
+  Explanation scene;
+  for (const ViewScorer& view : views_) scene.push_back(view.empty_scene());
+  return scene;
+}
+
+void PoseScorer::add(const TriangleMesh& mesh, const Pose& T_world_object, Explanation& scene) {
+  for (std::size_t i = 0; i < views_.size(); ++i) views_[i].add(mesh, T_world_object, scene[i]);
+}
+
+double PoseScorer::gain(const Explanation& scene, const TriangleMesh& mesh, const Pose& T_world_object) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < views_.size(); ++i) sum += views_[i].gain(scene[i], mesh, T_world_object);
+  return sum;
+}
+
+PixelCounts PoseScorer::count(const Explanation& scene, const TriangleMesh& mesh, const Pose& T_world_object) {
+  PixelCounts counts;
+  for (std::size_t i = 0; i < views_.size(); ++i) counts += views_[i].count(scene[i], mesh, T_world_object);
+  return counts;
+}
+
+double PoseScorer::sigma() const {
+  double largest = 0.0;
+  for (const ViewScorer& view : views_) largest = std::max(largest, view.observation().sigma);
+  return largest;
 }
 
 }  // namespace dofusion

@@ -42,7 +42,7 @@ void ignore_labels(const std::vector<std::uint8_t>& labels, Observation& observa
 // farther (the camera looked through the scene). No reading costs kMissingCost where the scene faces the camera and
 // nothing on grazing faces, which sensors do not see. That is far less than a likelihood would say: shadows and dark
 // surfaces drop out, too.
-struct Explanation {
+struct ViewExplanation {
   DepthImage depth;
   Image<float> cost;
 };
@@ -54,6 +54,9 @@ inline constexpr float kMissingCost = 0.7f;
 inline constexpr float kGrazingCosine = 0.25f;  // of the incidence: 75 degrees
 inline constexpr float kFacingCosine = 0.35f;   // 70 degrees; between the two a part of kMissingCost
 
+// One for each view of the scene.
+using Explanation = std::vector<ViewExplanation>;
+
 double total_cost(const Explanation& explanation);
 
 // Counts of the pixels in which an object is the nearest surface of its scene.
@@ -62,12 +65,38 @@ struct PixelCounts {
   int nearer = 0;     // reading in front of it: something hides it
   int behind = 0;     // reading behind it: it cannot be there
   int missing = 0;    // no reading
+
+  PixelCounts& operator+=(const PixelCounts& other);
 };
 
-// Scores poses against one observation. Of one thread.
+// Scores poses against the observation of one camera. Of one thread.
+class ViewScorer {
+ public:
+  explicit ViewScorer(const Observation& observation) : observation_(&observation), raster_(observation.camera) {}
+
+  ViewExplanation empty_scene() const;
+  void add(const TriangleMesh& mesh, const Pose& T_world_object, ViewExplanation& scene);
+  double gain(const ViewExplanation& scene, const TriangleMesh& mesh, const Pose& T_world_object);
+  PixelCounts count(const ViewExplanation& scene, const TriangleMesh& mesh, const Pose& T_world_object);
+
+  // The object's patch as `raster` gives it.
+  const RasterPatch& render(const TriangleMesh& mesh, const Pose& T_world_object) {
+    return raster_.render(mesh, observation_->T_camera_world * T_world_object);
+  }
+  const Observation& observation() const { return *observation_; }
+
+ private:
+  const Observation* observation_;
+  DepthRaster raster_;
+};
+
+// Scores poses against what all cameras saw: costs, gains and counts are sums over the views. Of one thread.
 class PoseScorer {
  public:
-  explicit PoseScorer(const Observation& observation) : observation_(&observation), raster_(observation.camera) {}
+  explicit PoseScorer(const Observation& observation) { views_.emplace_back(observation); }
+  explicit PoseScorer(const std::vector<Observation>& observations) {
+    for (const Observation& observation : observations) views_.emplace_back(observation);
+  }
 
   // The table alone.
   Explanation empty_scene() const;
@@ -80,15 +109,13 @@ class PoseScorer {
 
   PixelCounts count(const Explanation& scene, const TriangleMesh& mesh, const Pose& T_world_object);
 
-  // The object's patch as `raster` gives it.
-  const RasterPatch& render(const TriangleMesh& mesh, const Pose& T_world_object) {
-    return raster_.render(mesh, observation_->T_camera_world * T_world_object);
-  }
-  const Observation& observation() const { return *observation_; }
+  // The largest sigma of the views, metres.
+  double sigma() const;
+
+  std::vector<ViewScorer>& views() { return views_; }
 
  private:
-  const Observation* observation_;
-  DepthRaster raster_;
+  std::vector<ViewScorer> views_;
 };
 
 }  // namespace dofusion

@@ -3,27 +3,19 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
+#include <cstring>
 #include <stdexcept>
 #include <string>
 
 #include "perception/embree_handles.h"
+#include "perception/tile_packet.h"
+#include "stability/parallel_for.h"
 
 namespace dofusion {
 namespace {
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
-constexpr int kPacket = 16;  // rays, as 4 x 4 neighbouring pixels
-constexpr int kTile = 4;
+constexpr int kBand = 4;  // rows of tiles that a thread takes at a time
 constexpr int kMaxObjects = 255 - kLabelFirstObject;
-
-// Debian's Embree honours ray masks: a ray with mask 0 hits nothing.
-constexpr unsigned kHitEverything = 0xFFFFFFFFu;
-
-TriangleMesh table_mesh(double half_size) {
-  const double h = half_size;
-  return {{{-h, -h, 0}, {h, -h, 0}, {h, h, 0}, {-h, h, 0}}, {{0, 1, 2}, {0, 2, 3}}};
-}
 
 std::vector<Eigen::Vector3d> triangle_normals(const TriangleMesh& mesh) {
   std::vector<Eigen::Vector3d> normals;
@@ -35,55 +27,27 @@ std::vector<Eigen::Vector3d> triangle_normals(const TriangleMesh& mesh) {
   return normals;
 }
 
-// The rays of a window of pixels. A ray's direction has length 1 along the optical axis, so that Embree's ray
-// parameter is the z-depth itself.
-struct PixelGrid {
-  PixelGrid(const Camera& camera, const Pose& T_world_camera, int u0_, int v0_, int u1, int v1, int stride_)
-      : u0(u0_),
-        v0(v0_),
-        stride(stride_),
-        columns((u1 - u0_ + stride_ - 1) / stride_),
-        rows((v1 - v0_ + stride_ - 1) / stride_) {
-    const Eigen::Matrix3d R = T_world_camera.linear();
-    origin = T_world_camera.translation().cast<float>();
-    corner = (R * Eigen::Vector3d((u0 - camera.cx) / camera.fx, (v0 - camera.cy) / camera.fy, 1.0)).cast<float>();
-    right = (R.col(0) * (stride / camera.fx)).cast<float>();
-    down = (R.col(1) * (stride / camera.fy)).cast<float>();
-  }
-  Eigen::Vector3f direction(int row, int column) const {
-    return corner + static_cast<float>(column) * right + static_cast<float>(row) * down;
-  }
-  int u0, v0, stride, columns, rows;
-  Eigen::Vector3f origin, corner, right, down;
-};
+constexpr std::array<float, kPacket> kZeros{};
 
-// What all packets of a window have in common.
-void start_packet(const PixelGrid& grid, RTCRayHit16& packet) {
-  for (int k = 0; k < kPacket; ++k) {
-    packet.ray.org_x[k] = grid.origin.x();
-    packet.ray.org_y[k] = grid.origin.y();
-    packet.ray.org_z[k] = grid.origin.z();
-    packet.ray.tnear[k] = 0.0f;
-    packet.ray.time[k] = 0.0f;
-    packet.ray.mask[k] = kHitEverything;
-    packet.ray.flags[k] = 0;
-  }
+std::uint8_t label_of(int object) {
+  return object < 0 ? kLabelTable : static_cast<std::uint8_t>(kLabelFirstObject + object);
 }
 
-// The 4 x 4 rays of the tile whose first pixel is (row0, column0); rays beyond the window are marked invalid.
-void fill_packet(const PixelGrid& grid, int row0, int column0, RTCRayHit16& packet, int* valid) {
-  const Eigen::Vector3f d = grid.direction(row0, column0);
-  for (int k = 0; k < kPacket; ++k) {
-    const int row = k / kTile, column = k % kTile;
-    const float r = static_cast<float>(row), c = static_cast<float>(column);
-    valid[k] = row0 + row < grid.rows && column0 + column < grid.columns ? -1 : 0;
-    packet.ray.dir_x[k] = d.x() + c * grid.right.x() + r * grid.down.x();
-    packet.ray.dir_y[k] = d.y() + c * grid.right.y() + r * grid.down.y();
-    packet.ray.dir_z[k] = d.z() + c * grid.right.z() + r * grid.down.z();
-    packet.ray.tfar[k] = kInfinity;
-    packet.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
-    packet.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
-  }
+template <class T>
+void resize(Image<T>& image, int width, int height) {
+  image.width = width;
+  image.height = height;
+  image.pixels.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+}
+
+static_assert(sizeof(Eigen::Vector3f) == 3 * sizeof(float), "normals are written as rows of floats");
+
+// Copies four pixels into each of the tile's rows.
+template <class T>
+void write_rows(Image<T>& image, int row0, int column0, const void* four_pixels, std::size_t step) {
+  for (int row = 0; row < kTile; ++row)
+    std::memcpy(static_cast<void*>(&image.at(row0 + row, column0)),
+                static_cast<const char*>(four_pixels) + static_cast<std::size_t>(row) * step, kTile * sizeof(T));
 }
 
 }  // namespace
@@ -95,8 +59,9 @@ struct Scanner::Impl {
   std::vector<EmbreeGeometry> instances;              // per object, geometry id i of the world
   std::vector<std::vector<Eigen::Vector3d>> normals;  // per object and triangle, in the object's frame
   std::vector<Eigen::Matrix3d> R_world_object;        // per object
-  EmbreeGeometry table;                               // geometry id objects.size() of the world
+  Table table;
   EmbreeScene world;
+  int threads = 1;
   bool changed = true;  // since the world was last committed
 
   void commit() {
@@ -106,7 +71,7 @@ struct Scanner::Impl {
     changed = false;
   }
 
-  // Embree's geometry ids: an object's hit carries its instance, the table's none.
+  // An object's hit carries its instance, which is the object's index, the table's none.
   int object_of(unsigned instance) const {
     return instance == RTC_INVALID_GEOMETRY_ID ? -1 : static_cast<int>(instance);
   }
@@ -114,6 +79,9 @@ struct Scanner::Impl {
     if (object < 0) return Eigen::Vector3d::UnitZ();
     return R_world_object[object] * normals[object][triangle];
   }
+
+  class TileWriter;
+  void render_grid(const PixelGrid& grid, const Pose& T_world_camera, int thread_count, Scan& scan) const;
 };
 
 Scanner::Scanner(std::vector<ObjectPtr> objects, const ScannerOptions& options) : impl_(std::make_unique<Impl>()) {
@@ -122,7 +90,10 @@ Scanner::Scanner(std::vector<ObjectPtr> objects, const ScannerOptions& options) 
                                 std::to_string(objects.size()));
   if (!(options.table_half_size > 0.0))
     throw std::invalid_argument("table_half_size must be positive, not " + std::to_string(options.table_half_size));
+  if (options.threads < 1)
+    throw std::invalid_argument("a scanner needs at least one thread, not " + std::to_string(options.threads));
   Impl& impl = *impl_;
+  impl.threads = options.threads;
   impl.objects = std::move(objects);
   impl.device = make_embree_device();
   impl.world.reset(rtcNewScene(impl.device.get()));
@@ -145,10 +116,7 @@ Scanner::Scanner(std::vector<ObjectPtr> objects, const ScannerOptions& options) 
     rtcSetGeometryTimeStepCount(impl.instances.back().get(), 1);
     rtcAttachGeometryByID(impl.world.get(), impl.instances.back().get(), static_cast<unsigned>(i));
   }
-  if (options.table) {
-    impl.table = make_triangles(impl.device.get(), table_mesh(options.table_half_size));
-    rtcAttachGeometryByID(impl.world.get(), impl.table.get(), static_cast<unsigned>(impl.objects.size()));
-  }
+  if (options.table) impl.table.half_size = static_cast<float>(options.table_half_size);
   set_poses(std::vector<Pose>(impl.objects.size(), Pose::Identity()));
 }
 
@@ -193,41 +161,102 @@ void check_camera(const Camera& camera) {
 
 }  // namespace
 
-// Casts the grid's rays in packets and hands each hit to found(pixel, depth, instance, triangle).
-template <class Found>
-void cast_grid(RTCScene world, const PixelGrid& grid, const Found& found) {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  RTCRayHit16 packet;
-  alignas(64) int valid[kPacket];
-  start_packet(grid, packet);
-  for (int row0 = 0; row0 < grid.rows; row0 += kTile)
-    for (int column0 = 0; column0 < grid.columns; column0 += kTile) {
-      fill_packet(grid, row0, column0, packet, valid);
-      rtcIntersect16(valid, world, &context, &packet);
-      for (int k = 0; k < kPacket; ++k)
-        if (valid[k] && packet.hit.geomID[k] != RTC_INVALID_GEOMETRY_ID)
-          found(static_cast<std::size_t>(row0 + k / kTile) * grid.columns + column0 + k % kTile, packet.ray.tfar[k],
-                packet.hit.instID[0][k], packet.hit.primID[k]);
+// Writes the hits of a tile into the images. Neighbouring rays mostly hit the same triangle, so that what belongs to a
+// triangle is kept until another one comes.
+class Scanner::Impl::TileWriter {
+ public:
+  TileWriter(const Impl& impl, const Pose& T_world_camera, Scan& scan)
+      : impl_(impl),
+        R_camera_world_(T_world_camera.linear().transpose()),
+        scan_(scan),
+        normals_(!scan.normals.pixels.empty()) {}
+
+  void write(const TilePacket& tile, int row0, int column0) {
+    if (tile.uniform())
+      write_uniform(tile, row0, column0);
+    else
+      write_each(tile, row0, column0);
+  }
+
+ private:
+  void write_uniform(const TilePacket& tile, int row0, int column0) {
+    look_up(tile, 0);
+    write_rows(scan_.depth, row0, column0, tile.hit(0) ? tile.depths() : kZeros.data(), kTile * sizeof(float));
+    const std::array<std::uint8_t, kTile> labels{label_, label_, label_, label_};
+    write_rows(scan_.labels, row0, column0, labels.data(), 0);
+    if (!normals_) return;
+    const std::array<Eigen::Vector3f, kTile> normals{normal_, normal_, normal_, normal_};
+    write_rows(scan_.normals, row0, column0, normals.data(), 0);
+  }
+
+  void write_each(const TilePacket& tile, int row0, int column0) {
+    for (int row = 0; row < tile.rows(); ++row)
+      for (int column = 0; column < tile.columns(); ++column) {
+        const int k = row * kTile + column;
+        look_up(tile, k);
+        scan_.depth.at(row0 + row, column0 + column) = tile.hit(k) ? tile.depths()[k] : 0.0f;
+        scan_.labels.at(row0 + row, column0 + column) = label_;
+        if (normals_) scan_.normals.at(row0 + row, column0 + column) = normal_;
+      }
+  }
+
+  // Label and normal of what ray k hit.
+  void look_up(const TilePacket& tile, int k) {
+    if (!tile.hit(k)) {
+      known_ = false;
+      label_ = kLabelNothing;
+      normal_.setZero();
+      return;
     }
+    if (known_ && instance_ == tile.instance(k) && triangle_ == tile.triangle(k)) return;
+    known_ = true;
+    instance_ = tile.instance(k);
+    triangle_ = tile.triangle(k);
+    const int object = impl_.object_of(instance_);
+    label_ = label_of(object);
+    if (normals_) normal_ = (R_camera_world_ * impl_.normal_world(object, triangle_)).cast<float>();
+  }
+
+  const Impl& impl_;
+  Eigen::Matrix3d R_camera_world_;
+  Scan& scan_;
+  bool normals_;        // are wanted
+  bool known_ = false;  // the last ray hit the triangle below
+  unsigned instance_ = 0, triangle_ = 0;
+  std::uint8_t label_ = kLabelNothing;
+  Eigen::Vector3f normal_ = Eigen::Vector3f::Zero();  // camera frame
+};
+
+// Fills the images, whose sizes are the grid's; normals only if there are any.
+void Scanner::Impl::render_grid(const PixelGrid& grid, const Pose& T_world_camera, int thread_count, Scan& scan) const {
+  const std::int64_t tile_rows = (grid.rows + kTile - 1) / kTile;
+  const std::int64_t bands = (tile_rows + kBand - 1) / kBand;
+  parallel_for(bands, thread_count, [&](std::int64_t band, int) {
+    TilePacket tile(grid, table);
+    TileWriter writer(*this, T_world_camera, scan);
+    const int end = static_cast<int>(std::min(tile_rows, (band + 1) * kBand)) * kTile;
+    for (int row0 = static_cast<int>(band) * kBand * kTile; row0 < end; row0 += kTile)
+      for (int column0 = 0; column0 < grid.columns; column0 += kTile) {
+        tile.cast(world.get(), row0, column0);
+        writer.write(tile, row0, column0);
+      }
+  });
 }
 
 Scan Scanner::render(const Camera& camera, const Pose& T_world_camera) const {
-  check_camera(camera);
-  Impl& impl = *impl_;
-  impl.commit();
-  Scan scan{DepthImage(camera.width, camera.height), LabelImage(camera.width, camera.height),
-            NormalImage(camera.width, camera.height, Eigen::Vector3f::Zero())};
-  const PixelGrid grid(camera, T_world_camera, 0, 0, camera.width, camera.height, 1);
-  const Eigen::Matrix3d R_camera_world = T_world_camera.linear().transpose();
-  cast_grid(impl.world.get(), grid, [&](std::size_t pixel, float depth, unsigned instance, unsigned triangle) {
-    const int object = impl.object_of(instance);
-    scan.depth.pixels[pixel] = depth;
-    scan.labels.pixels[pixel] = object < 0 ? kLabelTable : static_cast<std::uint8_t>(kLabelFirstObject + object);
-    scan.normals.pixels[pixel] = (R_camera_world * impl.normal_world(object, triangle)).cast<float>();
-  });
+  Scan scan;
+  render(camera, T_world_camera, scan);
   return scan;
+}
+
+void Scanner::render(const Camera& camera, const Pose& T_world_camera, Scan& scan) const {
+  check_camera(camera);
+  impl_->commit();
+  resize(scan.depth, camera.width, camera.height);
+  resize(scan.labels, camera.width, camera.height);
+  resize(scan.normals, camera.width, camera.height);
+  const PixelGrid grid(camera, T_world_camera, 0, 0, camera.width, camera.height, 1);
+  impl_->render_grid(grid, T_world_camera, impl_->threads, scan);
 }
 
 Scan Scanner::render_window(const Camera& camera, const Pose& T_world_camera, int u0, int v0, int u1, int v1,
@@ -237,15 +266,10 @@ Scan Scanner::render_window(const Camera& camera, const Pose& T_world_camera, in
     throw std::invalid_argument("the window [" + std::to_string(u0) + ", " + std::to_string(u1) + ") x [" +
                                 std::to_string(v0) + ", " + std::to_string(v1) + ") with stride " +
                                 std::to_string(stride) + " has no pixels");
-  Impl& impl = *impl_;
-  impl.commit();
+  impl_->commit();
   const PixelGrid grid(camera, T_world_camera, u0, v0, u1, v1, stride);
   Scan scan{DepthImage(grid.columns, grid.rows), LabelImage(grid.columns, grid.rows), NormalImage()};
-  cast_grid(impl.world.get(), grid, [&](std::size_t pixel, float depth, unsigned instance, unsigned) {
-    const int object = impl.object_of(instance);
-    scan.depth.pixels[pixel] = depth;
-    scan.labels.pixels[pixel] = object < 0 ? kLabelTable : static_cast<std::uint8_t>(kLabelFirstObject + object);
-  });
+  impl_->render_grid(grid, T_world_camera, 1, scan);
   return scan;
 }
 
@@ -269,6 +293,9 @@ std::optional<Scanner::Hit> Scanner::cast_ray(const Eigen::Vector3d& origin_worl
   ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   rtcIntersect1(impl.world.get(), &context, &ray);
+  const float table =
+      impl.table.distance(ray.ray.org_x, ray.ray.org_y, ray.ray.org_z, ray.ray.dir_x, ray.ray.dir_y, ray.ray.dir_z);
+  if (table < ray.ray.tfar) return Hit{table, -1, impl.normal_world(-1, 0)};
   if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
   const int object = impl.object_of(ray.hit.instID[0]);
   return Hit{ray.ray.tfar, object, impl.normal_world(object, ray.hit.primID)};
@@ -300,8 +327,12 @@ std::vector<std::uint8_t> Scanner::occluded(const std::vector<Segment>& segments
       packet.flags[k] = 0;
     }
     rtcOccluded16(valid, impl_->world.get(), &context, &packet);
-    for (std::size_t k = 0; k < kPacket && first + k < segments.size(); ++k)
-      result[first + k] = packet.tfar[k] < 0.0f ? 1 : 0;  // Embree marks an occluded ray with -infinity
+    for (std::size_t k = 0; k < kPacket && first + k < segments.size(); ++k) {
+      const float table = impl_->table.distance(packet.org_x[k], packet.org_y[k], packet.org_z[k], packet.dir_x[k],
+                                                packet.dir_y[k], packet.dir_z[k]);
+      // Embree marks an occluded ray with -infinity.
+      result[first + k] = packet.tfar[k] < 0.0f || table <= 1.0f ? 1 : 0;
+    }
   }
   return result;
 }

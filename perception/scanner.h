@@ -20,6 +20,7 @@ struct Scan {
 struct ScannerOptions {
   bool table = true;             // the plane z = 0 is there
   double table_half_size = 2.0;  // metres; the table ends there
+  int threads = 1;               // of `render`; the images do not depend on it
 };
 
 // One Embree scene with an instance per object, whose poses change without rebuilding the objects' trees. `render`
@@ -37,7 +38,10 @@ class Scanner {
   // Hides (false) or shows (true) object i.
   void set_visible(int object, bool visible);
 
+  // Throws std::invalid_argument unless the camera has a positive size and focal length.
   Scan render(const Camera& camera, const Pose& T_world_camera) const;
+  // The same into images that are there already, whose memory is used again if their size fits: for many scans.
+  void render(const Camera& camera, const Pose& T_world_camera, Scan& scan) const;
 
   // Depth and labels inside the pixel rectangle [u0, u1) x [v0, v1) alone, at every `stride`-th pixel, for render
   // and compare; the images have ceil(size / stride) pixels.

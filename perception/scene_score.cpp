@@ -39,7 +39,7 @@ PlacedObject refined_object(const std::vector<ObjectModel>& models, PoseScorer& 
            floating_cost(models, at, others, costs.floating);
   };
   // At last only readings that the noise allows: others see another face, or pass the outline.
-  const double noise = 3.0 * scorer.observation().sigma;
+  const double noise = 3.0 * scorer.sigma();
   const AlignOptions closing{4, std::max(0.003, noise), noise + 0.0005};
   const Pose aligned =
       align_to_readings(scorer, scene, model.object->mesh, object.T_world_object, object.freedom, closing);

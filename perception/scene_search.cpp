@@ -17,12 +17,13 @@ constexpr int kRefined = 4;              // grown scenes that are refined
 constexpr double kSurelyExplained = 0.03;
 
 std::vector<Candidate> candidates_for(const std::vector<ObjectModel>& models, const Cluster& cluster,
-                                      const PyramidScene& scene, const Target& target,
+                                      const PyramidScene& scene, const UnexplainedTarget& target,
                                       const SceneSearchOptions& options) {
   CandidateOptions candidate_options;
   candidate_options.threads = options.threads;
   candidate_options.penetration = options.costs.penetration;
-  return find_candidates(models, cluster.pyramid, scene, target, cluster.camera, cluster.T_world_camera,
+  const ClusterView& view = cluster.views[target.view];
+  return find_candidates(models, cluster.pyramid, scene, target.target, view.camera, view.T_world_camera,
                          candidate_options);
 }
 
@@ -85,7 +86,7 @@ SceneHypothesis improved_by_swaps(const std::vector<ObjectModel>& models, const 
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
     const std::vector<PlacedObject> others = without(scene.objects, i);
     const PyramidScene explained = explain(cluster.pyramid, models, others);
-    const std::optional<Target> target = next_target(cluster, explained.fine, options.fewest_pixels);
+    const std::optional<UnexplainedTarget> target = next_target(cluster, explained.fine, options.fewest_pixels);
     if (!target) continue;
     SceneHypothesis best = scene;
     for (const Candidate& candidate : candidates_for(models, cluster, explained, *target, options)) {
@@ -119,7 +120,7 @@ std::vector<SceneHypothesis> grow_scenes(const std::vector<ObjectModel>& models,
     std::vector<SceneHypothesis> next;
     for (const SceneHypothesis& scene : open) {
       const PyramidScene explained = explain(cluster.pyramid, models, scene.objects);
-      const std::optional<Target> target = next_target(cluster, explained.fine, options.fewest_pixels);
+      const std::optional<UnexplainedTarget> target = next_target(cluster, explained.fine, options.fewest_pixels);
       complete.push_back(scene);
       if (!target) continue;
       const std::vector<Candidate> candidates = candidates_for(models, cluster, explained, *target, options);

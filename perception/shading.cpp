@@ -3,8 +3,11 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <functional>
+#include <utility>
 #include <vector>
 
+#include "perception/geom_scanner.h"
 #include "perception/picture.h"
 #include "perception/scanner.h"
 
@@ -59,19 +62,34 @@ struct Surface {
   Eigen::Vector3f point, normal;  // world; the point is a little above the surface
 };
 
-// Renders the scan at kSide times the camera's resolution and shades it row by row.
+// How something looks.
+struct Paint {
+  Linear albedo = Linear::Zero();
+  bool ground = false;  // fades to the backdrop, has no outline
+  int outline = 1;      // samples
+};
+
+// What is seen at kSide times the picture's resolution, and how it looks.
+struct Sight {
+  DepthImage depth;
+  NormalImage normals;
+  IdImage things;             // -1 nothing
+  std::vector<Paint> paints;  // per thing
+  float scale = 1.0f;         // how large the scene is; 1 is a table top
+  std::function<std::vector<std::uint8_t>(const std::vector<Scanner::Segment>&)> occluded;
+};
+
+// Shades a sight row by row.
 class Shader {
  public:
-  Shader(const Scanner& scanner, const Camera& camera, const Pose& T_world_camera, const PictureOptions& options)
-      : scanner_(scanner),
-        options_(options),
-        fine_(resized(camera, kSide)),
+  Shader(Sight sight, const Camera& fine, const Pose& T_world_camera, const PictureOptions& options)
+      : fine_(fine),
         T_world_camera_(T_world_camera),
         R_world_camera_(T_world_camera.linear().cast<float>()),
         lamp_(lamp_for(T_world_camera)),
         lamp_points_(disk_points(options.shadow_samples)),
         sky_points_(disk_points(options.ambient_samples)),
-        scan_(scanner.render(fine_, T_world_camera)) {
+        sight_(std::move(sight)) {
     // The backdrop is as bright as the table in full light, so that the table fades without a seam.
     backdrop_ = lit(linear_of(kTableColour), Eigen::Vector3f::UnitZ(), 1.0f, 1.0f, -R_world_camera_.col(2));
     const Eigen::Vector3d eye = T_world_camera.translation(), forward = T_world_camera.linear().col(2);
@@ -106,8 +124,8 @@ class Shader {
   }
 
   Surface surface_at(int row, int column) const {
-    const double depth = scan_.depth.at(row, column);
-    const Eigen::Vector3f normal = R_world_camera_ * scan_.normals.at(row, column);
+    const double depth = sight_.depth.at(row, column);
+    const Eigen::Vector3f normal = R_world_camera_ * sight_.normals.at(row, column);
     const Eigen::Vector3d point = T_world_camera_ * unproject(fine_, column, row, depth);
     return {point.cast<float>() + kSurfaceOffset * normal, normal};
   }
@@ -130,26 +148,26 @@ class Shader {
         owners_.push_back(i);
       }
     const auto rays = static_cast<float>((points.size() + kTurns - 1) / kTurns);
-    const std::vector<std::uint8_t> hidden = scanner_.occluded(segments_);
+    const std::vector<std::uint8_t> hidden = sight_.occluded(segments_);
     for (std::size_t k = 0; k < hidden.size(); ++k) seen[owners_[k]] -= static_cast<float>(hidden[k]) / rays;
     return seen;
   }
 
   std::vector<float> lamp_visibility(int row) {
-    constexpr float kLampDistance = 3.0f;  // metres
+    const float lamp_distance = 3.0f * sight_.scale;  // metres
     const auto frame = tangents(lamp_.direction);
     return visibility(row, lamp_points_, [&](const Surface&, const Eigen::Vector2f& p) -> Eigen::Vector3f {
-      return kLampDistance * (lamp_.direction + lamp_.radius * (p.x() * frame[0] + p.y() * frame[1]));
+      return lamp_distance * (lamp_.direction + lamp_.radius * (p.x() * frame[0] + p.y() * frame[1]));
     });
   }
 
   std::vector<float> sky_visibility(int row) {
-    constexpr float kReach = 0.15f;  // metres; what lies farther does not darken
+    const float reach = 0.15f * sight_.scale;  // metres; what lies farther does not darken
     return visibility(row, sky_points_, [&](const Surface& surface, const Eigen::Vector2f& p) -> Eigen::Vector3f {
       // Points of the disk lifted to the hemisphere: cosine-weighted.
       const auto frame = tangents(surface.normal);
       const float up = std::sqrt(std::max(0.0f, 1.0f - p.squaredNorm()));
-      return kReach * (p.x() * frame[0] + p.y() * frame[1] + up * surface.normal);
+      return reach * (p.x() * frame[0] + p.y() * frame[1] + up * surface.normal);
     });
   }
 
@@ -162,41 +180,36 @@ class Shader {
   }
 
   Linear colour_at(int row, int column, float lamp, float sky) const {
-    const std::uint8_t label = scan_.labels.at(row, column);
-    if (label == kLabelNothing) return backdrop_;
+    const std::int32_t thing = sight_.things.at(row, column);
+    if (thing < 0) return backdrop_;
+    const Paint& paint = sight_.paints[static_cast<std::size_t>(thing)];
     const Surface& surface = surfaces_[static_cast<std::size_t>(column)];
     const Eigen::Vector3f to_viewer = (T_world_camera_.translation().cast<float>() - surface.point).normalized();
-    if (label == kLabelTable) {
-      const Linear table = lit(linear_of(kTableColour), surface.normal, lamp, sky, to_viewer);
-      const float distance = (surface.point - centre_).head<2>().norm();
+    const Linear colour = lit(paint.albedo, surface.normal, lamp, sky, to_viewer);
+    if (paint.ground) {
+      const float distance = (surface.point - centre_).head<2>().norm() / sight_.scale;
       const float fade = std::clamp((distance - kFadeBegin) / (kFadeEnd - kFadeBegin), 0.0f, 1.0f);
-      return (1.0f - fade) * table + fade * backdrop_;
+      return (1.0f - fade) * colour + fade * backdrop_;
     }
-    const int object = label - kLabelFirstObject;
-    const bool highlighted = object == options_.highlighted;
-    const Linear albedo = linear_of(highlighted ? kQueryColour : object_colour(object));
-    const Linear colour = lit(albedo, surface.normal, lamp, sky, to_viewer);
-    return outlined(row, column, highlighted ? 3 : 1) ? Linear(0.35f * colour) : colour;
+    return outlined(row, column, paint.outline) ? Linear(0.35f * colour) : colour;
   }
 
-  // Within `reach` samples of another label, seen from the nearer side.
+  // Within `reach` samples of another thing, seen from the nearer side.
   bool outlined(int row, int column, int reach) const {
-    const std::uint8_t label = scan_.labels.at(row, column);
+    const std::int32_t thing = sight_.things.at(row, column);
     for (int r = row - reach; r <= row + reach; r += reach)
       for (int c = column - reach; c <= column + reach; c += reach) {
-        if (scan_.labels.contains(r, c) && scan_.labels.at(r, c) != label) return true;
+        if (sight_.things.contains(r, c) && sight_.things.at(r, c) != thing) return true;
       }
     return false;
   }
 
-  const Scanner& scanner_;
-  PictureOptions options_;
   Camera fine_;
   Pose T_world_camera_;
   Eigen::Matrix3f R_world_camera_;
   Lamp lamp_;
   std::vector<Eigen::Vector2f> lamp_points_, sky_points_;
-  Scan scan_;
+  Sight sight_;
   Linear backdrop_ = Linear::Zero();
   Eigen::Vector3f centre_ = Eigen::Vector3f::Zero();
   std::vector<Surface> surfaces_;           // of the row being shaded
@@ -204,11 +217,60 @@ class Shader {
   std::vector<std::size_t> owners_;         // scratch
 };
 
+// Things are labels less one: the table, then the objects.
+Sight sight_of(const Scanner& scanner, const Camera& fine, const Pose& T_world_camera, const PictureOptions& options) {
+  Scan scan = scanner.render(fine, T_world_camera);
+  Sight sight{std::move(scan.depth), std::move(scan.normals), IdImage(fine.width, fine.height), {}, 1.0f, {}};
+  std::transform(scan.labels.pixels.begin(), scan.labels.pixels.end(), sight.things.pixels.begin(),
+                 [](std::uint8_t label) { return label - kLabelTable; });
+  sight.paints.push_back({linear_of(kTableColour), true, 1});
+  for (int object = 0; object < 255 - kLabelFirstObject; ++object) {
+    const bool highlighted = object == options.highlighted;
+    sight.paints.push_back({linear_of(highlighted ? kQueryColour : object_colour(object)), false, highlighted ? 3 : 1});
+  }
+  sight.occluded = [&scanner](const std::vector<Scanner::Segment>& segments) { return scanner.occluded(segments); };
+  return sight;
+}
+
+// Things are geoms.
+Sight sight_of(const GeomScanner& scanner, const Camera& fine, const Pose& T_world_camera,
+               const PictureOptions& options) {
+  GeomScan scan = scanner.render(fine, T_world_camera);
+  Sight sight{std::move(scan.depth), std::move(scan.normals), std::move(scan.geoms), {}, 1.0f, {}};
+  for (const Geom& geom : scanner.geoms()) {
+    const bool highlighted = geom.body == options.highlighted;
+    // Colours of files are as they are shown, like bytes.
+    const auto channel = [&](std::size_t k) {
+      return linear_of(static_cast<std::uint8_t>(std::lround(255.0f * std::clamp(geom.rgba[k], 0.0f, 1.0f))));
+    };
+    const Linear albedo = highlighted ? linear_of(kQueryColour) : Linear(channel(0), channel(1), channel(2));
+    sight.paints.push_back({albedo, geom.type == GeomType::kPlane, highlighted ? 3 : 1});
+  }
+  // As large as what is in the middle of the picture is far, in table tops 0.7 m away.
+  const float middle = sight.depth.at(fine.height / 2, fine.width / 2);
+  if (middle > 0.0f) sight.scale = middle / 0.7f;
+  sight.occluded = [&scanner](const std::vector<Scanner::Segment>& segments) { return scanner.occluded(segments); };
+  return sight;
+}
+
+template <class AnyScanner>
+ColourImage shaded(const AnyScanner& scanner, const Camera& camera, const Pose& T_world_camera,
+                   const PictureOptions& options) {
+  const Camera fine = resized(camera, kSide);
+  return Shader(sight_of(scanner, fine, T_world_camera, options), fine, T_world_camera, options)
+      .picture(camera.width, camera.height);
+}
+
 }  // namespace
 
 ColourImage shaded_picture(const Scanner& scanner, const Camera& camera, const Pose& T_world_camera,
                            const PictureOptions& options) {
-  return Shader(scanner, camera, T_world_camera, options).picture(camera.width, camera.height);
+  return shaded(scanner, camera, T_world_camera, options);
+}
+
+ColourImage shaded_picture(const GeomScanner& scanner, const Camera& camera, const Pose& T_world_camera,
+                           const PictureOptions& options) {
+  return shaded(scanner, camera, T_world_camera, options);
 }
 
 ColourImage shaded_picture(const Scene& scene, const Camera& camera, const Pose& T_world_camera,

@@ -209,7 +209,7 @@ class ShapeFitter {
     const int thin = size.x() < size.y() ? 0 : 1;
     const double wanted = std::min(size[1 - thin], top - support_);
     if (size[thin] >= 0.5 * wanted) return;
-    const double camera = axes[thin].dot(evidence_.table.T_world_camera.translation());
+    const double camera = axes[thin].dot(evidence_.front().T_world_camera.translation());
     (camera > high[thin] ? low[thin] : high[thin]) += (camera > high[thin] ? -1.0 : 1.0) * (wanted - size[thin]);
   }
 

@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "perception/object_view.h"
 
@@ -28,14 +29,15 @@ struct FittedShape {
   double score = 0.0;  // share of the readings explained less those contradicted
 };
 
-// The image that a shape must agree with.
-struct ShapeEvidence {
+// The images that a shape must agree with. An object has the same label in all of them.
+struct ViewEvidence {
   const DepthImage& depth;
   const LabelImage& labels;
   const Camera& camera;
-  const Table& table;
+  Pose T_world_camera;
   DepthSigma sigma;
 };
+using ShapeEvidence = std::vector<ViewEvidence>;  // at least one
 
 // The best of: a box, a cylinder or a prism that stands upright; a prism that lies; a box in any orientation; the hull
 // of the points and their feet. All reach from what is seen down to z = support and not below. A shape gains by every

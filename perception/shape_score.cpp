@@ -24,8 +24,8 @@ struct Window {
   int u0 = 0, v0 = 0, u1 = 0, v1 = 0;  // [u0, u1) x [v0, v1)
 };
 
-Window image_window(const TriangleMesh& mesh, const ShapeEvidence& evidence) {
-  const Pose T_camera_world = evidence.table.T_world_camera.inverse();
+Window image_window(const TriangleMesh& mesh, const ViewEvidence& evidence) {
+  const Pose T_camera_world = evidence.T_world_camera.inverse();
   Eigen::Vector2d low = Eigen::Vector2d::Constant(1e9), high = -low;
   for (const Eigen::Vector3d& vertex : mesh.vertices) {
     const Eigen::Vector3d p = T_camera_world * vertex;
@@ -41,10 +41,10 @@ Window image_window(const TriangleMesh& mesh, const ShapeEvidence& evidence) {
 
 // Pixels of other labels that see something behind the shape.
 double contradicted_pixels(const TriangleMesh& mesh, const std::vector<HalfSpace>& body, int label,
-                           const ShapeEvidence& evidence, double slack) {
+                           const ViewEvidence& evidence, double slack) {
   constexpr int kStride = 3;
   const Window window = image_window(mesh, evidence);
-  const Pose& T_world_camera = evidence.table.T_world_camera;
+  const Pose& T_world_camera = evidence.T_world_camera;
   int count = 0;
   for (int v = window.v0; v < window.v1; v += kStride) {
     for (int u = window.u0; u < window.u1; u += kStride) {
@@ -62,8 +62,9 @@ double contradicted_pixels(const TriangleMesh& mesh, const std::vector<HalfSpace
 
 double score_shape(const TriangleMesh& mesh, const ObjectView& view, const ShapeEvidence& evidence, double slack) {
   const std::vector<HalfSpace> body = half_spaces(mesh);
-  return explained_share(body, view, slack) -
-         contradicted_pixels(mesh, body, view.label, evidence, slack) / std::max(1, view.pixels);
+  double contradicted = 0.0;
+  for (const ViewEvidence& seen : evidence) contradicted += contradicted_pixels(mesh, body, view.label, seen, slack);
+  return explained_share(body, view, slack) - contradicted / std::max(1, view.pixels);
 }
 
 }  // namespace dofusion

@@ -1,4 +1,4 @@
-// How well a convex shape agrees with a depth image.
+// How well a convex shape agrees with depth images.
 #pragma once
 
 #include "perception/shape_fit.h"
@@ -6,7 +6,7 @@
 namespace dofusion {
 
 // 1 - mean squared distance of the object's readings to the shape's surface, in tolerances and at most 1 each, less
-// the number of pixels (as a share of the object's) whose reading lies behind the shape.
+// the number of pixels (as a share of the object's) of all images whose reading lies behind the shape.
 double score_shape(const TriangleMesh& mesh, const ObjectView& view, const ShapeEvidence& evidence, double slack);
 
 }  // namespace dofusion

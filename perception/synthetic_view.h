@@ -1,6 +1,8 @@
 // One synthetic depth image of a scene: a viewpoint, an exact scan, the sensor's noise.
 #pragma once
 
+#include <string>
+
 #include "perception/camera.h"
 #include "perception/scanner.h"
 #include "perception/sensor_noise.h"
@@ -41,5 +43,13 @@ struct SyntheticView {
 // Looks at the scene's centre from a random viewpoint.
 SyntheticView make_synthetic_view(const Scene& scene, const Camera& camera, const SyntheticViewOptions& options,
                                   Rng& rng);
+
+// Looks from T_world_camera, with a scanner of the scene at its poses.
+SyntheticView make_synthetic_view(const Scanner& scanner, const Camera& camera, const Pose& T_world_camera,
+                                  const SyntheticViewOptions& options, Rng& rng);
+
+// Why a camera at this place shows nothing of use: it is under the table (where there is one), or inside an object (by
+// the winding number of its mesh). Empty: it does.
+std::string viewpoint_problem(const Scene& scene, const Pose& T_world_camera, bool table = true);
 
 }  // namespace dofusion

@@ -8,8 +8,8 @@ namespace {
 
 class PixelGroups {
  public:
-  PixelGroups(const Cluster& cluster, const Explanation& scene) : cluster_(cluster), scene_(scene) {
-    const Observation& seen = cluster.pyramid.fine;
+  PixelGroups(const ClusterView& cluster, const Observation& seen, const ViewExplanation& scene)
+      : cluster_(cluster), seen_(seen), scene_(scene) {
     open_ = Image<std::uint8_t>(seen.depth.width, seen.depth.height, 0);
     for (int v = 0; v < open_.height; ++v) {
       for (int u = 0; u < open_.width; ++u) open_.at(v, u) = is_unexplained(v, u);
@@ -39,10 +39,9 @@ class PixelGroups {
 
  private:
   bool is_unexplained(int v, int u) const {
-    const Observation& seen = cluster_.pyramid.fine;
     const std::vector<std::uint8_t>& others = cluster_.other_labels;
-    const bool own = std::find(others.begin(), others.end(), seen.labels.at(v, u)) == others.end();
-    return own && seen.depth.at(v, u) > 0.0f && seen.depth.at(v, u) < scene_.depth.at(v, u) &&
+    const bool own = std::find(others.begin(), others.end(), seen_.labels.at(v, u)) == others.end();
+    return own && seen_.depth.at(v, u) > 0.0f && seen_.depth.at(v, u) < scene_.depth.at(v, u) &&
            scene_.cost.at(v, u) >= 0.99f * kNearerCost;
   }
 
@@ -62,7 +61,7 @@ class PixelGroups {
   }
 
   std::vector<int> flood(int v0, int u0, int* core) {
-    const LabelImage& labels = cluster_.pyramid.fine.labels;
+    const LabelImage& labels = seen_.labels;
     std::vector<int> group;
     std::vector<std::pair<int, int>> stack = {{v0, u0}};
     std::vector<std::pair<int, int>> members;
@@ -88,19 +87,30 @@ class PixelGroups {
     return group;
   }
 
-  const Cluster& cluster_;
-  const Explanation& scene_;
+  const ClusterView& cluster_;
+  const Observation& seen_;
+  const ViewExplanation& scene_;
   Image<std::uint8_t> open_;
   int core_of_largest_ = 0;
 };
 
 }  // namespace
 
-std::optional<Target> next_target(const Cluster& cluster, const Explanation& scene, int fewest_pixels) {
-  PixelGroups groups(cluster, scene);
-  const std::vector<int> pixels = groups.largest();
-  if (groups.core_of_largest() < fewest_pixels) return std::nullopt;
-  return make_target(pixels, *cluster.depth, cluster.camera, cluster.T_world_camera, *cluster.face_map);
+std::optional<UnexplainedTarget> next_target(const Cluster& cluster, const Explanation& scene, int fewest_pixels) {
+  std::vector<int> pixels;
+  std::size_t best = 0;
+  int most = fewest_pixels - 1;
+  for (std::size_t i = 0; i < cluster.views.size(); ++i) {
+    PixelGroups groups(cluster.views[i], cluster.pyramid.fine[i], scene[i]);
+    std::vector<int> largest = groups.largest();
+    if (groups.core_of_largest() <= most) continue;
+    most = groups.core_of_largest();
+    best = i;
+    pixels = std::move(largest);
+  }
+  if (pixels.empty()) return std::nullopt;
+  const ClusterView& view = cluster.views[best];
+  return UnexplainedTarget{make_target(pixels, *view.depth, view.camera, view.T_world_camera, *view.face_map), best};
 }
 
 }  // namespace dofusion

@@ -7,20 +7,31 @@
 
 namespace dofusion {
 
-// Everything about one cluster of objects that touch or hide each other.
-struct Cluster {
+// What one camera saw of a cluster.
+struct ClusterView {
   const DepthImage* depth = nullptr;
   const FaceMap* face_map = nullptr;
   Camera camera;
   Pose T_world_camera = Pose::Identity();
   PixelWindow window;                      // around its pixels, stride 1
   std::vector<std::uint8_t> other_labels;  // labels of the segmentation that belong to other clusters
-  ObservationPyramid pyramid;
 };
 
-// The largest connected group of pixels of one label that read nearer than the scene, or nullopt if none has
+// Everything about one cluster of objects that touch or hide each other.
+struct Cluster {
+  std::vector<ClusterView> views;
+  ObservationPyramid pyramid;  // of the same views
+};
+
+// Pixels of the view in which they say most.
+struct UnexplainedTarget {
+  Target target;
+  std::size_t view = 0;
+};
+
+// The largest connected group of pixels of one view and label that read nearer than the scene, or nullopt if none has
 // `fewest_pixels` pixels well inside it (slivers along outlines have none). Pixels without an object's
 // label join any: segmentation leaves out what is small.
-std::optional<Target> next_target(const Cluster& cluster, const Explanation& scene, int fewest_pixels);
+std::optional<UnexplainedTarget> next_target(const Cluster& cluster, const Explanation& scene, int fewest_pixels);
 
 }  // namespace dofusion

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <stdexcept>
 
 #include "perception/shape_score.h"
 #include "perception/stacking.h"
@@ -10,22 +11,43 @@
 namespace dofusion {
 namespace {
 
-// A shape may miss readings by what the sensor bends planes, too.
-double widening(const UnknownRecoveryOptions& options) { return 1.0 + 0.6 * options.warp; }
+// How exactly one view's sensor measures.
+struct Exactness {
+  DepthSigma sigma;
+  double warp = 0.0;  // sigmas by which it bends planes
+};
 
-// Views of all labels, those with the lowest feet first, so that what carries others comes before them.
-std::vector<ObjectView> views_from_below(const DepthImage& depth, const Camera& camera, const Table& table,
-                                         const LabelImage& labels, const UnknownRecoveryOptions& options) {
-  std::vector<ObjectView> views;
-  for (int label = kLabelFirstObject; label < kLabelFirstObject + count_objects(labels); ++label) {
-    ObjectView view = view_object(depth, camera, table, labels, label, options.faces);
-    if (static_cast<int>(view.points.size()) < options.min_pixels) continue;
-    for (double& sigma : view.sigma) sigma *= widening(options);
-    views.push_back(std::move(view));
+Exactness exactness_of(const View& view, const UnknownRecoveryOptions& options) {
+  if (!options.calibrate) return {options.sigma, options.warp};
+  const Table table = table_of(view);
+  const DepthSigma sigma = calibrate_sigma(view.depth, view.camera, table, options.sigma);
+  return {sigma, measure_warp(view.depth, view.camera, table, sigma)};
+}
+
+// What one view shows of an object. Its shape may miss readings by what the sensor bends planes, too.
+ObjectView view_of_label(const View& view, int label, const Exactness& exact, const UnknownRecoveryOptions& options) {
+  FaceOptions faces = options.faces;
+  faces.sigma = exact.sigma;
+  ObjectView seen = view_object(view.depth, view.camera, table_of(view), view.labels, label, faces);
+  for (double& sigma : seen.sigma) sigma *= 1.0 + 0.6 * exact.warp;
+  return seen;
+}
+
+// All labels, those with the lowest feet first, so that what carries others comes before them.
+std::vector<ObjectView> objects_from_below(const std::vector<View>& views, const std::vector<Exactness>& exact,
+                                           const UnknownRecoveryOptions& options) {
+  int labels = 0;
+  for (const View& view : views) labels = std::max(labels, count_objects(view.labels));
+  std::vector<ObjectView> objects;
+  for (int label = kLabelFirstObject; label < kLabelFirstObject + labels; ++label) {
+    std::vector<ObjectView> seen;
+    for (std::size_t i = 0; i < views.size(); ++i) seen.push_back(view_of_label(views[i], label, exact[i], options));
+    ObjectView object = seen.size() == 1 ? std::move(seen.front()) : joined(seen);
+    if (static_cast<int>(object.points.size()) >= options.min_pixels) objects.push_back(std::move(object));
   }
-  std::stable_sort(views.begin(), views.end(),
+  std::stable_sort(objects.begin(), objects.end(),
                    [](const ObjectView& a, const ObjectView& b) { return a.lowest < b.lowest; });
-  return views;
+  return objects;
 }
 
 struct Cut {
@@ -95,22 +117,45 @@ RecoveredObject to_object(const Body& body, int index, const ShapeEvidence& evid
   return result;
 }
 
+// From the fused label to the one that most of its pixels had in the first view.
+void label_in_first_view(const View& first, const LabelImage& fused, RecoveredObject& object) {
+  std::vector<int> votes(256, 0);
+  object.pixels = 0;
+  for (std::size_t p = 0; p < fused.pixels.size(); ++p) {
+    if (fused.pixels[p] != object.label) continue;
+    ++object.pixels;
+    ++votes[first.labels.pixels[p]];
+  }
+  object.label = object.pixels > 0 ? static_cast<int>(std::max_element(votes.begin(), votes.end()) - votes.begin()) : 0;
+}
+
 }  // namespace
 
 std::vector<RecoveredObject> recover_unknown(const DepthImage& depth, const Camera& camera, const Table& table,
-                                             const LabelImage& labels, const UnknownRecoveryOptions& user_options) {
-  check_image_size(depth.width, depth.height, camera);
-  check_image_size(labels.width, labels.height, camera);
-  UnknownRecoveryOptions options = user_options;
-  if (options.calibrate) {
-    options.sigma = calibrate_sigma(depth, camera, table, options.sigma);
-    options.warp = measure_warp(depth, camera, table, options.sigma);
+                                             const LabelImage& labels, const UnknownRecoveryOptions& options) {
+  return recover_unknown({View{depth, camera, table.T_world_camera, labels}}, options);
+}
+
+std::vector<RecoveredObject> recover_unknown(const std::vector<View>& user_views,
+                                             const UnknownRecoveryOptions& user_options) {
+  if (user_views.empty()) throw std::invalid_argument("recover_unknown: no view");
+  for (const View& view : user_views) {
+    check_image_size(view.depth.width, view.depth.height, view.camera);
+    check_image_size(view.labels.width, view.labels.height, view.camera);
   }
-  options.faces.sigma = options.sigma;
-  const ShapeEvidence evidence{depth, labels, camera, table, options.sigma};
+  std::vector<View> views = user_views;
+  if (views.size() > 1) fuse_labels(views);
+  std::vector<Exactness> exact;
+  ShapeEvidence evidence;
+  for (const View& view : views) {
+    exact.push_back(exactness_of(view, user_options));
+    evidence.push_back({view.depth, view.labels, view.camera, view.T_world_camera, exact.back().sigma});
+  }
+  UnknownRecoveryOptions options = user_options;
+  options.sigma = exact.front().sigma;
 
   std::vector<Body> bodies;
-  for (ObjectView& view : views_from_below(depth, camera, table, labels, options)) {
+  for (ObjectView& view : objects_from_below(views, exact, options)) {
     std::optional<FittedShape> shape = fit_on_support(view, bodies, evidence, options);
     if (shape) bodies.push_back({std::move(view), std::move(*shape)});
   }
@@ -121,6 +166,7 @@ std::vector<RecoveredObject> recover_unknown(const DepthImage& depth, const Came
   std::vector<RecoveredObject> objects;
   for (const Body& body : bodies) {
     objects.push_back(to_object(body, static_cast<int>(objects.size()), evidence, options.shape.slack));
+    if (views.size() > 1) label_in_first_view(user_views.front(), views.front().labels, objects.back());
   }
   return objects;
 }

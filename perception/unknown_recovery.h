@@ -6,6 +6,7 @@
 #include "perception/recovery.h"
 #include "perception/segmentation.h"
 #include "perception/shape_fit.h"
+#include "perception/views.h"
 
 namespace dofusion {
 
@@ -32,6 +33,13 @@ struct UnknownRecoveryOptions {
 // std::invalid_argument if an image is not of the camera's size.
 std::vector<RecoveredObject> recover_unknown(const DepthImage& depth, const Camera& camera, const Table& table,
                                              const LabelImage& labels, const UnknownRecoveryOptions& options = {});
+
+// The same from several views of one scene together: an object is what the readings of all views show, and what any
+// view sees behind it is proven empty. The views' world comes from on_common_table(), their labels need not agree
+// (fuse_labels() is applied to them). `label` and `pixels` are those of the first view, 0 if it does not show the
+// object. Throws std::invalid_argument as above, and without any view.
+std::vector<RecoveredObject> recover_unknown(const std::vector<View>& views,
+                                             const UnknownRecoveryOptions& options = {});
 
 // The recovered objects as a scene.
 Scene to_scene(const std::vector<RecoveredObject>& objects);

@@ -4,11 +4,8 @@
 #include <filesystem>
 #include <optional>
 
-#include <assimp/Importer.hpp>
-#include <assimp/postprocess.h>
-#include <assimp/scene.h>
-
 #include "stability/files.h"
+#include "stability/mesh_import.h"
 #include "stability/mesh_topology.h"
 
 namespace dofusion {
@@ -45,25 +42,21 @@ void check_file(const std::string& path) {
   }
 }
 
-void append(TriangleMesh& mesh, const aiMesh& part, double unit, const std::string& path) {
-  const int first = static_cast<int>(mesh.vertices.size());
-  for (unsigned i = 0; i < part.mNumVertices; ++i) {
-    mesh.vertices.push_back(unit * Eigen::Vector3d(part.mVertices[i].x, part.mVertices[i].y, part.mVertices[i].z));
-  }
-  for (unsigned i = 0; i < part.mNumFaces; ++i) {
-    const aiFace& face = part.mFaces[i];
-    if (face.mNumIndices != 3) continue;  // points and lines are no surface
-    const Eigen::Vector3i t = Eigen::Vector3i(static_cast<int>(face.mIndices[0]), static_cast<int>(face.mIndices[1]),
-                                              static_cast<int>(face.mIndices[2])) +
-                              Eigen::Vector3i::Constant(first);
-    for (int k = 0; k < 3; ++k) {
-      if (mesh.vertices[t[k]].allFinite()) continue;
+// In metres; throws at the first corner that is not finite.
+TriangleMesh to_metres(const ImportedMesh& file, double unit, const std::string& path) {
+  TriangleMesh mesh;
+  for (const auto& v : file.vertices) mesh.vertices.push_back(unit * Eigen::Vector3d(v[0], v[1], v[2]));
+  for (const auto& corners : file.triangles) {
+    for (const std::uint32_t corner : corners) {
+      if (mesh.vertices[corner].allFinite()) continue;
       throw InputError(path + ": triangle " + std::to_string(mesh.triangles.size() + 1) + " has a corner at " +
-                       text_of(mesh.vertices[t[k]] / unit) +
+                       text_of(mesh.vertices[corner] / unit) +
                        ", which is not finite in single precision; export the mesh again");
     }
-    mesh.triangles.push_back(t);
+    mesh.triangles.emplace_back(static_cast<int>(corners[0]), static_cast<int>(corners[1]),
+                                static_cast<int>(corners[2]));
   }
+  return mesh;
 }
 
 void refuse_holes_and_walls(const TriangleMesh& mesh, double unit, const std::string& path) {
@@ -111,23 +104,7 @@ void refuse_without_volume(const TriangleMesh& mesh, const std::string& path) {
 
 TriangleMesh read_mesh(const std::string& path, double unit) {
   check_file(path);
-  Assimp::Importer importer;
-  // Vertices are welded below, by exact position; assimp's own way would take longer.
-  const aiScene* scene = importer.ReadFile(path, aiProcess_Triangulate | aiProcess_PreTransformVertices);
-  if (scene == nullptr || scene->mNumMeshes == 0) {
-    const std::string reason = importer.GetErrorString();
-    throw InputError(path + ": not a mesh that can be read" + (reason.empty() ? "" : " (" + reason + ")"));
-  }
-  std::size_t triangles = 0;
-  for (unsigned m = 0; m < scene->mNumMeshes; ++m) triangles += scene->mMeshes[m]->mNumFaces;
-  if (triangles > kMostFileTriangles) {
-    throw InputError(path + ": a mesh of " + std::to_string(triangles) + " triangles; simplify it to " +
-                     std::to_string(kMostFileTriangles) + " or fewer");
-  }
-  TriangleMesh mesh;
-  for (unsigned m = 0; m < scene->mNumMeshes; ++m) append(mesh, *scene->mMeshes[m], unit, path);
-  importer.FreeScene();
-  mesh = weld(mesh);
+  const TriangleMesh mesh = weld(to_metres(import_mesh(path, kMostFileTriangles), unit, path));
   if (mesh.triangles.empty()) throw InputError(path + ": the mesh has no triangles");
   return mesh;
 }

@@ -13,7 +13,8 @@ inline constexpr std::size_t kMostFileTriangles = 5000000;
 // Reads OBJ, STL, PLY, … ; coordinates are multiplied by `unit` to give metres. All parts of the file are merged,
 // polygons triangulated, equal vertices welded. Throws InputError naming the file if it cannot be read, has no
 // triangles or more than kMostFileTriangles, or has a coordinate that is not finite; the message names the first such
-// triangle.
+// triangle. A child process runs assimp, which crashes on some damaged files and never returns from others: within 2 s of
+// processor time and 2 s more for every megabyte.
 TriangleMesh read_mesh(const std::string& path, double unit = 1.0);
 
 // As read_mesh, for a mesh that bounds a solid. Triangles that are there twice are dropped; flipped ones are turned as

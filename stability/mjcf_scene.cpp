@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "stability/files.h"
+#include "stability/mjcf_geoms.h"
 #include "stability/mjcf_objects.h"
 #include "stability/mjcf_solids.h"
 #include "stability/simulation.h"
@@ -65,11 +66,10 @@ int find_keyframe(const mjModel& model, const std::string& keyframe, const std::
                    (known.empty() ? "it has none at all" : "it has " + known));
 }
 
-Pose centre_pose(const mjData& data, int body) {
-  PoseArray pose;
-  std::copy_n(data.xipos + 3 * body, 3, pose.begin());
-  std::copy_n(data.xquat + 4 * body, 4, pose.begin() + 3);
-  return from_array(pose);
+void check_count(const std::vector<Pose>& T_world_moving, const std::vector<int>& moving) {
+  if (T_world_moving.size() == moving.size()) return;
+  throw std::invalid_argument(std::to_string(T_world_moving.size()) + " poses for " + std::to_string(moving.size()) +
+                              " moving bodies");
 }
 
 }  // namespace
@@ -80,6 +80,8 @@ struct MjcfScene::Impl {
   std::vector<SceneBody> bodies;
   std::vector<int> ids;     // of the bodies in the model
   std::vector<int> moving;  // indices into bodies
+  std::vector<Geom> geoms;
+  std::vector<SceneCamera> cameras;
   std::unique_ptr<Simulation> simulation;
 
   void load(const std::string& keyframe_name) {
@@ -102,6 +104,10 @@ struct MjcfScene::Impl {
     } catch (const MujocoError& e) {
       throw InputError(path + ": " + e.what());
     }
+    geoms = model_geoms(simulation->model(), ids, path);
+    simulation->reset(keyframe);
+    simulation->place_cameras();
+    cameras = model_cameras(simulation->model(), simulation->data(), ids, path);
   }
 
   // The state to start from, kinematics included.
@@ -130,6 +136,18 @@ std::vector<Pose> MjcfScene::initial_poses() const {
   return poses;
 }
 
+std::vector<Pose> MjcfScene::poses(const std::vector<Pose>& T_world_moving) const {
+  check_count(T_world_moving, impl_->moving);
+  std::vector<Pose> all = initial_poses();
+  for (std::size_t i = 0; i < T_world_moving.size(); ++i) {
+    all[static_cast<std::size_t>(impl_->moving[i])] = T_world_moving[i];
+  }
+  return all;
+}
+
+const std::vector<Geom>& MjcfScene::geoms() const { return impl_->geoms; }
+const std::vector<SceneCamera>& MjcfScene::cameras() const { return impl_->cameras; }
+
 SettleResult MjcfScene::settle(const PhysicsOptions& options) const {
   const mjModel& model = impl_->simulation->model();
   SettleResult still;
@@ -157,10 +175,7 @@ Scene MjcfScene::to_scene() const {
 }
 
 Scene MjcfScene::to_scene(const std::vector<Pose>& T_world_moving) const {
-  if (T_world_moving.size() != impl_->moving.size()) {
-    throw std::invalid_argument("to_scene: " + std::to_string(T_world_moving.size()) + " poses for " +
-                                std::to_string(impl_->moving.size()) + " moving bodies");
-  }
+  check_count(T_world_moving, impl_->moving);
   const mjModel& model = impl_->simulation->model();
   const mjData& data = impl_->start();
   Scene scene;

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "stability/geom.h"
 #include "stability/physics.h"
 #include "stability/scene.h"
 
@@ -22,8 +23,8 @@ class MjcfScene {
  public:
   // `keyframe`: where to start from, the name or number of one of the file's keyframes, positions, speeds and controls;
   // empty: the positions of its bodies, at rest. Throws InputError naming the file, with MuJoCo's reason where it has
-  // one: if it, or what it includes, is missing or cannot be built; if it has no geom; if a size, pose, mass or the
-  // time step makes no sense; if there is no such keyframe.
+  // one: if it, or what it includes, is missing or cannot be built; if it has no geom; if a size, pose, mass, a
+  // camera's field of view or the time step makes no sense; if there is no such keyframe.
   explicit MjcfScene(const std::string& path, const std::string& keyframe = "");
   ~MjcfScene();
   MjcfScene(MjcfScene&&) noexcept;
@@ -35,6 +36,19 @@ class MjcfScene {
   const std::vector<int>& moving() const;
   // One per body: position of its centre of mass, orientation of its frame.
   std::vector<Pose> initial_poses() const;
+
+  // The same with the moving bodies elsewhere, for instance at the poses of a SettleResult: as many as moving(). Throws
+  // std::invalid_argument otherwise.
+  std::vector<Pose> poses(const std::vector<Pose>& T_world_moving) const;
+
+  // All of the file's, in its order, also those that cannot be touched; skins and sites are none. A geom is at
+  // T_world_body * T_body_geom, with its body's pose as in initial_poses() or poses(). Meshes are as MuJoCo keeps them,
+  // about their inertial frames (T_body_geom makes up for it), not their hulls. Textures count with their mean colour.
+  const std::vector<Geom>& geoms() const;
+
+  // In the file's order. One with a mode other than "fixed" (it tracks or targets something), or on a body that moves
+  // but has no geom, not even through what is fixed to it, stays where it is in the state to start from.
+  const std::vector<SceneCamera>& cameras() const;
 
   // With the file's settings until everything that moves rests. Of `options`, the time limit and what rest is count,
   // nothing else. SettleResult is about moving(), with poses as initial_poses; in `touching`, -1 is everything that

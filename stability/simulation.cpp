@@ -83,6 +83,12 @@ std::vector<Pose> Simulation::poses() {
   return result;
 }
 
+void Simulation::place_cameras() {
+  mj_kinematics(model_.get(), data_.get());
+  mj_comPos(model_.get(), data_.get());  // what cameras may track
+  mj_camlight(model_.get(), data_.get());
+}
+
 void Simulation::apply(const Loads& loads) {
   mju_copy3(model_->opt.gravity, loads.gravity.data());
   for (std::size_t i = 0; i < loads.forces.size(); ++i) {

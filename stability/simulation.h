@@ -33,6 +33,9 @@ class Simulation {
   // Of each body: position of its centre of mass, orientation of its frame.
   std::vector<Pose> poses();
 
+  // Brings the poses of cameras and bodies in data() up to date.
+  void place_cameras();
+
   const mjModel& model() const { return *model_; }
   const mjData& data() const { return *data_; }
 

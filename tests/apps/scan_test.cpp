@@ -26,8 +26,8 @@ std::vector<std::string> files_below(const std::string& folder) {
 
 TEST(Scan, WritesABopDatasetThatTheSeedRepeats) {
   const TemporaryDirectory directory;
-  const std::vector<std::string> common = {"--task", "stack", "--objects", "2",    "--count", "2", "--cameras", "2",
-                                           "--size", "160",   "120",       "--seed", "4"};
+  const std::vector<std::string> common = {"--task", "stack",  "--objects", "2",   "--count", "2", "--cameras",
+                                           "2",      "--size", "160",       "120", "--seed",  "4"};
   for (const auto& [out, threads] : {std::pair<const char*, const char*>{"a", "1"}, {"b", "2"}}) {
     std::vector<std::string> arguments = common;
     for (const std::string& word : {std::string("--threads"), std::string(threads), std::string("--json"),

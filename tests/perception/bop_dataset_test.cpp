@@ -42,9 +42,10 @@ struct WrittenScene {
     view.depth = view.truth.depth;
     for (int u = 0; u < kCamera.width; ++u) view.depth.at(80, u) = 0.0f;  // a row without readings
     write_bop_models(scene.objects, kCamera, directory.path());
-    BopSceneWriter writer(scene, {1, 2}, kCamera, directory.path() / "test" / bop_scene_name(0));
-    writer.add(view, ColourImage(kCamera.width, kCamera.height));
-    writer.finish();
+    const auto folder = directory.path() / "test" / bop_scene_name(0);
+    BopSceneWriter writer(scene, {1, 2}, folder);
+    writer.add(0, kCamera, view, ColourImage(kCamera.width, kCamera.height));
+    finish_bop_scene(folder, 1, scene);
   }
   json read(const std::string& name) const { return json::parse(read_file(directory.path() / name)); }
   LabelImage mask(const std::string& name) const {
@@ -125,9 +126,9 @@ TEST(BopDataset, SilhouettesGoOnBeyondTheImage) {
   SyntheticView aside = written.view;
   aside.T_world_camera.translation().x() += 0.2;
   const auto folder = written.directory.path() / "test" / bop_scene_name(1);
-  BopSceneWriter writer(written.scene, {1, 2}, kCamera, folder);
-  writer.add(aside, ColourImage(kCamera.width, kCamera.height));
-  writer.finish();
+  BopSceneWriter writer(written.scene, {1, 2}, folder);
+  writer.add(0, kCamera, aside, ColourImage(kCamera.width, kCamera.height));
+  finish_bop_scene(folder, 1, written.scene);
   const json info = json::parse(read_file(folder / "scene_gt_info.json"))["0"][1];
   EXPECT_LT(info["bbox_obj"][0].get<int>(), 0);
   const LabelImage mask = read_labels((folder / "mask/000000_000001.png").string(), kCamera);
@@ -137,8 +138,8 @@ TEST(BopDataset, SilhouettesGoOnBeyondTheImage) {
 TEST(BopDataset, CallersMistakesThrow) {
   const TemporaryDirectory directory;
   const Scene scene{{make_block("cube")}, {Pose::Identity()}};
-  EXPECT_THROW(BopSceneWriter(scene, {}, kCamera, directory.path()), std::invalid_argument);
-  EXPECT_THROW(BopSceneWriter(scene, {1}, kCamera, "/proc/nowhere"), InputError);
+  EXPECT_THROW(BopSceneWriter(scene, {}, directory.path()), std::invalid_argument);
+  EXPECT_THROW(BopSceneWriter(scene, {1}, "/proc/nowhere"), InputError);
 }
 
 }  // namespace

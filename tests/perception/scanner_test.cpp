@@ -1,6 +1,8 @@
 #include "perception/scanner.h"
 
 #include <algorithm>
+#include <cmath>
+#include <utility>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -52,6 +54,22 @@ TEST(Scanner, TableEndsAndIsOptional) {
   EXPECT_EQ(small.normals.at(80, 100 + 51), Eigen::Vector3f::Zero());
   options.table = false;
   EXPECT_EQ(count(Scanner({}, options).render(kCamera, overhead()).labels, kLabelNothing), 201 * 161);
+}
+
+TEST(Scanner, TableIsSeenFromBelowAndNotFromWithin) {
+  const Scanner scanner({});
+  const Camera camera{100.0, 100.0, 2.0, 2.0, 5, 5, 1.0};
+  const Pose below = make_pose(Eigen::Matrix3d::Identity(), {0.1, 0.2, -0.7});  // looks up
+  EXPECT_NEAR(scanner.render(camera, below).depth.at(2, 2), 0.7, kFloatTolerance);
+  EXPECT_EQ(scanner.render(camera, below).labels.at(2, 2), kLabelTable);
+  // Along z = 0, in it and a hair above it: the middle row's rays never meet it.
+  for (const double height : {0.0, 1e-3}) {
+    const Pose level = look_at({0.5, 0, height}, {0, 0, height});
+    const Scan scan = scanner.render(camera, level);
+    for (const float depth : scan.depth.pixels) EXPECT_TRUE(std::isfinite(depth));
+    EXPECT_EQ(scan.labels.at(2, 2), kLabelNothing) << height;
+    EXPECT_FALSE(scanner.cast_ray({0.5, 0, height}, {-1, 0, 0}));
+  }
 }
 
 TEST(Scanner, BoxEdgesAreAtTheirPixels) {
@@ -128,6 +146,54 @@ TEST(Scanner, WindowIsTheImagesPart) {
   const Scan beyond = scanner.render_window(kCamera, T_world_camera, -3, -2, 1, 1);
   EXPECT_EQ(beyond.depth.width, 4);
   EXPECT_NEAR(beyond.depth.at(2, 3), whole.depth.at(0, 0), kFloatTolerance);
+}
+
+TEST(Scanner, ThreadsAndKeptImagesMakeNoDifference) {
+  const std::vector<ObjectPtr> objects{make_block("cube"), make_block("hat"), make_sphere("ball", 0.03)};
+  const std::vector<Pose> poses{at(0, 0, 0.025), make_pose(so3_exp({0.2, 0.1, 0.4}), {0.06, 0.03, 0.04}),
+                                at(-0.05, 0.05, 0.03)};
+  ScannerOptions options;
+  options.table_half_size = 0.1;  // so that there are rays that hit nothing
+  Scanner plain(objects, options);
+  options.threads = 3;
+  Scanner threaded(objects, options);
+  plain.set_poses(poses);
+  threaded.set_poses(poses);
+  const Pose near = look_at({0.3, 0.3, 0.4}, {0.02, 0.01, 0.02}), far = look_at({0.9, -0.6, 0.8}, {0, 0, 0});
+  Scan kept;
+  for (const auto& [width, height] : {std::pair{201, 161}, {201, 161}, {320, 240}, {3, 2}, {1, 1}})
+    for (const Pose& T_world_camera : {near, far}) {
+      const Camera camera{300.0, 300.0, width / 2.0, height / 2.0, width, height, 1.0};
+      const Scan expected = plain.render(camera, T_world_camera);
+      threaded.render(camera, T_world_camera, kept);  // over the scan before
+      EXPECT_EQ(kept.depth.width, width);
+      EXPECT_EQ(kept.normals.height, height);
+      EXPECT_EQ(kept.depth.pixels, expected.depth.pixels);
+      EXPECT_EQ(kept.labels.pixels, expected.labels.pixels);
+      EXPECT_EQ(kept.normals.pixels, expected.normals.pixels);
+    }
+}
+
+TEST(Scanner, EveryPixelIsTheRayThroughItsCentre) {
+  // Also where a tile of the image lies on several triangles, half beside an object, or across the image's border.
+  Scanner scanner({make_block("cube"), make_sphere("ball", 0.03)});
+  scanner.set_poses({at(0, 0, 0.025), at(-0.05, 0.05, 0.03)});
+  const Pose T_world_camera = look_at({0.3, 0.3, 0.4}, {0, 0, 0.02});
+  const Scan scan = scanner.render(kCamera, T_world_camera);
+  int disagreeing = 0;
+  for (int v = 0; v < kCamera.height; ++v)
+    for (int u = 0; u < kCamera.width; ++u) {
+      const Eigen::Vector3d ray = unproject(kCamera, u, v, 1.0);
+      const auto hit = scanner.cast_ray(T_world_camera.translation(), T_world_camera.linear() * ray);
+      ASSERT_TRUE(hit);
+      const Eigen::Vector3d normal = T_world_camera.linear().transpose() * hit->normal;
+      const bool agrees = std::abs(hit->distance / ray.norm() - scan.depth.at(v, u)) < kFloatTolerance &&
+                          scan.labels.at(v, u) == hit->object + kLabelFirstObject &&
+                          (normal.cast<float>() - scan.normals.at(v, u)).norm() < 1e-5f;
+      if (!agrees) ++disagreeing;
+    }
+  // A ray along the edge of two triangles may be told either one; the ball's are a third of a pixel wide.
+  EXPECT_LE(disagreeing, 5);
 }
 
 TEST(Scanner, PosesAndVisibilityChangeTheNextScan) {
@@ -209,6 +275,7 @@ TEST(Scanner, CallersMistakesThrow) {
   EXPECT_THROW(scanner.cast_ray({0, 0, 1}, {0, 0, 0}), std::invalid_argument);
   EXPECT_THROW(Scanner(std::vector<ObjectPtr>(254, make_block("cube"))), std::invalid_argument);
   EXPECT_THROW(Scanner({}, {true, -1.0}), std::invalid_argument);
+  EXPECT_THROW(Scanner({}, {true, 2.0, 0}), std::invalid_argument);
 }
 
 }  // namespace

@@ -225,5 +225,14 @@ TEST(MeshIo, SizesThatSuggestAnotherUnitAreNamedWithIt) {
   EXPECT_EQ(message(1e9, 1.0), "m.obj: the object measures 1e+09 m; give the unit of its coordinates with --unit");
 }
 
+// Damaged files that assimp 5.2.4 does not return from.
+TEST(MeshIo, AFileThatTheReaderNeverEndsOnIsRefused) {
+  const TemporaryDirectory directory;
+  write_file(directory / "m.ply",
+             "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+             "element face 1\nproperty list uchar int vertex_indices\nend_of_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+  EXPECT_THAT(error_of(directory / "m.ply"), testing::HasSubstr("m.ply: not a mesh that can be read"));
+}
+
 }  // namespace
 }  // namespace dofusion
