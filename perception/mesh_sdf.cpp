@@ -146,11 +146,14 @@ std::vector<double> MeshSdf::distances(const std::vector<Eigen::Vector3d>& point
   const auto count = static_cast<std::int64_t>(points.size());
   std::vector<double> distances(points.size());
   parallel_for((count + kChunk - 1) / kChunk, threads, [&](std::int64_t chunk, int) {
+    const std::int64_t first = chunk * kChunk, size = std::min(kChunk, count - first);
+    Eigen::Vector3d near_points[kChunk];  // together first: one by one each would be waited for
+    for (std::int64_t i = 0; i < size; ++i) near_points[i] = points[order[first + i]] - impl_->centre;
     int nearest = -1;
-    for (std::int64_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) {
-      const Query query = impl_->find_nearest(points[order[i]] - impl_->centre, nearest);
+    for (std::int64_t i = 0; i < size; ++i) {
+      const Query query = impl_->find_nearest(near_points[i], nearest);
       nearest = query.nearest;
-      distances[order[i]] = impl_->signed_distance(query);
+      distances[order[first + i]] = impl_->signed_distance(query);
     }
   });
   return distances;
