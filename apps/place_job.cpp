@@ -29,7 +29,9 @@ constexpr std::size_t kMostTriangles = 100000;        // of a mesh: beyond, find
 ObjectAndOffset load_solid(const std::string& file, double unit, const std::string& unit_option) {
   ObjectAndOffset solid;
   try {
-    const TriangleMesh mesh = read_solid_mesh(file, unit);
+    const MendedMesh mended = read_mended_mesh(file, unit);
+    if (mended.holes > 0) std::fprintf(stderr, "%s\n", mending_note(file, mended).c_str());
+    const TriangleMesh& mesh = mended.mesh;
     if (mesh.triangles.size() > kMostTriangles) {
       throw InputError(file + ": a mesh of " + std::to_string(mesh.triangles.size()) + " triangles; simplify it to " +
                        std::to_string(kMostTriangles) + " or fewer");
@@ -171,8 +173,8 @@ PlaceResult run_placement(const PlaceInputs& inputs, const PlaceArguments& argum
   }
 
   Stopwatch watch;
-  const Scene scene = with_distance_fields(result.recovered.scene);
-  const ObjectPtr query = with_distance_field(inputs.query);
+  const Scene scene = with_distance_fields(result.recovered.scene, {}, arguments.placement.threads);
+  const ObjectPtr query = with_distance_field(inputs.query, {}, arguments.placement.threads);
   result.timing_ms.emplace_back("sdf", watch.lap_ms());
   SamplerOptions sampler;
   sampler.steps = arguments.placement.steps;

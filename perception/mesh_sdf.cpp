@@ -4,11 +4,12 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
+#include "perception/embree_handles.h"
 #include "perception/morton_order.h"
-#include "perception/triangle_tree.h"
 #include "perception/winding_number.h"
 #include "stability/mesh_holes.h"
 #include "stability/mesh_topology.h"
@@ -42,34 +43,77 @@ std::size_t check_surface(const TriangleMesh& mesh) {
   return filled.open_edges;
 }
 
+struct Query {
+  const std::vector<SignedTriangle>& triangles;
+  Eigen::Vector3d point;
+  double coordinate_size;  // the largest coordinate of point and mesh
+  int nearest = -1;        // triangle; -1: none, as for a point that is not finite
+  TriangleDistance distance{std::numeric_limits<double>::infinity(), 1.0};
+
+  void try_triangle(int triangle) {
+    const TriangleDistance candidate = distance_to_triangle(triangles[triangle], point);
+    if (!(candidate.squared < distance.squared)) return;
+    distance = candidate;
+    nearest = triangle;
+  }
+};
+
+// Embree culls boxes in float; a radius a little too large costs a few triangles more and misses none.
+float safe_radius(const Query& query) {
+  constexpr double kFloatError = 4.0 * std::numeric_limits<float>::epsilon();
+  const double radius = std::sqrt(query.distance.squared) * (1.0 + kFloatError) + kFloatError * query.coordinate_size;
+  return static_cast<float>(radius);
+}
+
+// Called by Embree for every triangle whose box is within the radius; shrinks the radius.
+bool visit_triangle(RTCPointQueryFunctionArguments* arguments) {
+  Query& query = *static_cast<Query*>(arguments->userPtr);
+  const double before = query.distance.squared;
+  query.try_triangle(static_cast<int>(arguments->primID));
+  if (!(query.distance.squared < before)) return false;
+  const float radius = safe_radius(query);
+  if (!(radius < arguments->query->radius)) return false;
+  arguments->query->radius = radius;
+  return true;
+}
+
 }  // namespace
 
 struct MeshSdf::Impl {
   Eigen::Vector3d centre;  // of the mesh; what follows is relative to it, where floats are finest
+  double half_size = 0.0;  // the largest coordinate
   std::size_t open_edges = 0;
   std::vector<SignedTriangle> triangles;
-  TriangleTree tree;
-  std::vector<NodeDipoles> dipoles;  // of an open mesh
+  EmbreeDevice device;
+  EmbreeScene scene;
+  std::optional<WindingNumber> winding_number;  // of an open mesh
 
-  // The triangle that is nearest, by way of one that was near to a point close by, or -1.
-  int nearest(const Eigen::Vector3d& p, int start_slot) const {
-    if (std::max(tree.half_size, p.cwiseAbs().maxCoeff()) < kFarthestCoordinate)
-      return best_nearest_function()(arrays_of(tree), p.data(), start_slot).slot;
-    NearestTriangle nearest;
-    for (int slot = 0; slot < static_cast<int>(tree.triangle.size()); ++slot) {
-      if (tree.triangle[slot] < 0) continue;
-      const double squared = distance_to_triangle(triangles[tree.triangle[slot]], p).squared;
-      if (squared < nearest.squared) nearest = {slot, squared};
+  // The triangle that is nearest to the point. `start`: one that is likely near, whose distance bounds the search from
+  // the outset, or -1.
+  Query find_nearest(const Eigen::Vector3d& p, int start) const {
+    constexpr double kFarthest = 1e15;  // beyond, squares may not be floats
+    Query query{triangles, p, std::max(half_size, p.cwiseAbs().maxCoeff())};
+    if (start >= 0) query.try_triangle(start);
+    if (!(query.coordinate_size < kFarthest)) {
+      for (std::size_t i = 0; i < triangles.size(); ++i) query.try_triangle(static_cast<int>(i));
+      return query;
     }
-    return nearest.slot;
+    RTCPointQuery ball;
+    ball.x = static_cast<float>(p.x());
+    ball.y = static_cast<float>(p.y());
+    ball.z = static_cast<float>(p.z());
+    ball.time = 0.0f;
+    ball.radius = safe_radius(query);
+    RTCPointQueryContext context;
+    rtcInitPointQueryContext(&context);
+    rtcPointQuery(scene.get(), &ball, &context, visit_triangle, &query);
+    return query;
   }
 
-  // `slot`: of the nearest triangle.
-  double distance(const Eigen::Vector3d& p, int slot) const {
-    if (slot < 0) return p.allFinite() ? std::numeric_limits<double>::infinity() : std::nan("");
-    const TriangleDistance nearest = distance_to_triangle(triangles[tree.triangle[slot]], p);
-    const double side = dipoles.empty() ? nearest.side : 0.5 - winding_number(tree, dipoles, p);
-    return std::copysign(std::sqrt(nearest.squared), side);
+  double signed_distance(const Query& query) const {
+    if (!query.point.allFinite()) return std::nan("");
+    const double side = winding_number ? 0.5 - (*winding_number)(query.point) : query.distance.side;
+    return std::copysign(std::sqrt(query.distance.squared), side);
   }
 };
 
@@ -78,10 +122,12 @@ MeshSdf::MeshSdf(const TriangleMesh& mesh) : impl_(std::make_unique<Impl>()) {
   impl_->open_edges = check_surface(welded);
   const BoundingBox box = bounding_box(welded);
   impl_->centre = 0.5 * (box.min + box.max);
+  impl_->half_size = 0.5 * (box.max - box.min).maxCoeff();
   const TriangleMesh centred = translated(welded, -impl_->centre);
   impl_->triangles = signed_triangles(centred);
-  impl_->tree = make_triangle_tree(centred);
-  if (impl_->open_edges > 0) impl_->dipoles = make_dipoles(impl_->tree);
+  impl_->device = make_embree_device();
+  impl_->scene = make_triangle_scene(impl_->device.get(), centred);
+  if (impl_->open_edges > 0) impl_->winding_number.emplace(centred);
 }
 
 MeshSdf::~MeshSdf() = default;
@@ -91,8 +137,7 @@ MeshSdf& MeshSdf::operator=(MeshSdf&&) noexcept = default;
 std::size_t MeshSdf::open_edges() const { return impl_->open_edges; }
 
 double MeshSdf::operator()(const Eigen::Vector3d& point) const {
-  const Eigen::Vector3d p = point - impl_->centre;
-  return impl_->distance(p, impl_->nearest(p, -1));
+  return impl_->signed_distance(impl_->find_nearest(point - impl_->centre, -1));
 }
 
 std::vector<double> MeshSdf::distances(const std::vector<Eigen::Vector3d>& points, int threads) const {
@@ -101,11 +146,14 @@ std::vector<double> MeshSdf::distances(const std::vector<Eigen::Vector3d>& point
   const auto count = static_cast<std::int64_t>(points.size());
   std::vector<double> distances(points.size());
   parallel_for((count + kChunk - 1) / kChunk, threads, [&](std::int64_t chunk, int) {
-    int slot = -1;
-    for (std::int64_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) {
-      const Eigen::Vector3d p = points[order[i]] - impl_->centre;
-      slot = impl_->nearest(p, slot);
-      distances[order[i]] = impl_->distance(p, slot);
+    const std::int64_t first = chunk * kChunk, size = std::min(kChunk, count - first);
+    Eigen::Vector3d near_points[kChunk];  // together first: one by one each would be waited for
+    for (std::int64_t i = 0; i < size; ++i) near_points[i] = points[order[first + i]] - impl_->centre;
+    int nearest = -1;
+    for (std::int64_t i = 0; i < size; ++i) {
+      const Query query = impl_->find_nearest(near_points[i], nearest);
+      nearest = query.nearest;
+      distances[order[first + i]] = impl_->signed_distance(query);
     }
   });
   return distances;

@@ -11,11 +11,11 @@
 
 namespace dofusion {
 
-// Answers what MeshDistance (stability/sdf.h) answers, in about logarithmic time. Distances are those of double
-// precision; negative inside. The sign comes from angle-weighted pseudonormals (Baerentzen and Aanaes 2005), which are
-// right on edges and corners too. A mesh with small holes does as well: then the sign is that of the generalised
-// winding number (perception/winding_number.h), right but for points about a hole's size from the hole. May be called
-// from several threads.
+// Answers what MeshDistance (stability/sdf.h) answers, in about logarithmic time: the nearest triangle from Embree's
+// point queries, its distance in double precision; negative inside. The sign comes from angle-weighted pseudonormals
+// (Baerentzen and Aanaes 2005), which are right on edges and corners too. A mesh with small holes does as well: then
+// the sign is that of the generalised winding number (perception/winding_number.h), right but for points about a hole's
+// size from the hole. May be called from several threads.
 class MeshSdf {
  public:
   // Throws std::invalid_argument if the mesh has no triangles, inner walls or flipped triangles (see surface_faults),

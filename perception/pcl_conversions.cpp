@@ -13,6 +13,7 @@
 #include <pcl/search/kdtree.h>
 #include <pcl/segmentation/extract_clusters.h>
 
+#include "stability/even_samples.h"
 #include "stability/files.h"
 
 namespace dofusion {
@@ -150,6 +151,18 @@ Cloud to_cloud(const DepthImage& depth, const Camera& camera) {
       cloud[static_cast<std::size_t>(v) * depth.width + u].getVector3fMap() =
           unproject(camera, u, v, depth.at(v, u)).cast<float>();
     }
+  }
+  return cloud;
+}
+
+SurfaceCloud to_cloud(const Object& object, int count, std::uint64_t seed) {
+  Rng rng = make_rng(seed);
+  SurfaceCloud cloud;
+  for (const SurfaceSample& sample : sample_surface_evenly(object.mesh, count, rng)) {
+    pcl::PointNormal point;
+    point.getVector3fMap() = sample.point.cast<float>();
+    point.getNormalVector3fMap() = sample.normal.cast<float>();
+    cloud.push_back(point);
   }
   return cloud;
 }

@@ -13,6 +13,7 @@
 #include "perception/image.h"
 #include "perception/recovery.h"
 #include "perception/table.h"
+#include "stability/scene.h"
 
 namespace dofusion {
 
@@ -27,6 +28,11 @@ void write_cloud(const Cloud& cloud, const std::string& path);
 
 // An organised cloud, one point a pixel; NaN where there is no reading.
 Cloud to_cloud(const DepthImage& depth, const Camera& camera);
+
+// `count` points spread evenly over the object's surface (sample_surface_evenly), with outward unit normals; the
+// object's own frame, metres. Same seed, same points.
+using SurfaceCloud = pcl::PointCloud<pcl::PointNormal>;
+SurfaceCloud to_cloud(const Object& object, int count, std::uint64_t seed = 0);
 
 // A depth image of a cloud, with its camera.
 struct CloudView {

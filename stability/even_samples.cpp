@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <queue>
+#include <utility>
 
 namespace dofusion {
 namespace {
@@ -19,76 +19,98 @@ struct Neighbours {
   std::vector<Neighbour> all;
 };
 
-// How much a sample speaks against another at this distance; Yuksel's w, with alpha = 8.
-float weight_of(double distance, double radius) {
-  const double w = 1.0 - distance / radius, w2 = w * w, w4 = w2 * w2;
-  return static_cast<float>(w4 * w4);
+constexpr int kCandidates = 4;  // per point; 5, Yuksel's choice, takes 1.4 times as long for 2 % more distance
+// Yuksel's weight limiting, beta (1 - (1 / candidates)^gamma) with 0.65 and 1.5: those nearer than this share of the
+// radius speak against each other no more than at it. None of them remain anyway, and which one goes is better left to
+// the others.
+constexpr float kNearShare = 0.65F * (1.0F - 0.125F);
+
+// How much a sample speaks against another at this share of the radius; Yuksel's w, with alpha = 8.
+float weight_of(float share) {
+  const float w = 1.0F - std::max(share, kNearShare), w2 = w * w, w4 = w2 * w2;
+  return w4 * w4;
 }
 
-// Samples in cubic cells of a grid, sorted by cell.
+// Samples in the cubic cells of a grid.
 class Cells {
  public:
-  Cells(const std::vector<SurfaceSample>& samples, double size) : samples_(samples), size_(size) {
-    origin_ = samples.front().point;
-    Eigen::Vector3d top = origin_;
+  // Cells are `radius` wide, or wider where there would be many more of them than samples.
+  Cells(const std::vector<SurfaceSample>& samples, double radius) {
+    Eigen::Vector3d low = samples.front().point, high = low;
     for (const SurfaceSample& s : samples) {
-      origin_ = origin_.cwiseMin(s.point);
-      top = top.cwiseMax(s.point);
+      low = low.cwiseMin(s.point);
+      high = high.cwiseMax(s.point);
     }
-    for (int k = 0; k < 3; ++k) counts_[k] = 1 + static_cast<std::int64_t>((top[k] - origin_[k]) / size);
-    for (std::size_t i = 0; i < samples.size(); ++i)
-      entries_.push_back({key_of(cell_of(samples[i].point)), static_cast<int>(i)});
-    std::sort(entries_.begin(), entries_.end(),
-              [](const Entry& a, const Entry& b) { return a.key < b.key || (a.key == b.key && a.sample < b.sample); });
+    low_ = low;
+    const Eigen::Vector3d extent = high - low;
+    const auto cells = [&](double size) { return ((extent / size).array().floor() + 1.0).prod(); };
+    size_ = radius;
+    while (cells(size_) > 8.0 * static_cast<double>(samples.size()) + 64.0) size_ *= 1.5;
+    for (int k = 0; k < 3; ++k) counts_[k] = 1 + static_cast<int>(extent[k] / size_);
+    sort(samples);
   }
 
-  // visit(sample) for all in the cells around a point.
+  // visit(first, last) for ranges of `order` that hold all samples within the radius of a point, and others.
   template <typename Visit>
   void around(const Eigen::Vector3d& point, const Visit& visit) const {
-    const Cell centre = cell_of(point);
-    const std::int64_t x_low = std::max<std::int64_t>(0, centre.x - 1);
-    const std::int64_t x_high = std::min(counts_[0] - 1, centre.x + 1);
-    for (std::int64_t z = centre.z - 1; z <= centre.z + 1; ++z) {
-      for (std::int64_t y = centre.y - 1; y <= centre.y + 1; ++y) {
-        if (y < 0 || z < 0 || y >= counts_[1] || z >= counts_[2]) continue;
-        const std::int64_t last = key_of({x_high, y, z});  // cells in a row along x have keys in a row
-        auto entry = std::lower_bound(entries_.begin(), entries_.end(), key_of({x_low, y, z}),
-                                      [](const Entry& e, std::int64_t key) { return e.key < key; });
-        for (; entry != entries_.end() && entry->key <= last; ++entry) visit(entry->sample);
+    const Eigen::Vector3i centre = cell_of(point);
+    const Eigen::Vector3i low = (centre.array() - 1).max(0).matrix();
+    const Eigen::Vector3i high = (centre.array() + 1).min(counts_.array() - 1).matrix();
+    for (int z = low.z(); z <= high.z(); ++z) {
+      for (int y = low.y(); y <= high.y(); ++y) {  // cells in a row along x are neighbours in the order
+        visit(start_[index_of({low.x(), y, z})], start_[index_of({high.x(), y, z}) + 1]);
       }
     }
   }
 
- private:
-  struct Cell {
-    std::int64_t x, y, z;
-  };
-  struct Entry {
-    std::int64_t key;
-    int sample;
-  };
-  Cell cell_of(const Eigen::Vector3d& p) const {
-    const Eigen::Vector3d q = (p - origin_) / size_;
-    return {static_cast<std::int64_t>(q.x()), static_cast<std::int64_t>(q.y()), static_cast<std::int64_t>(q.z())};
-  }
-  std::int64_t key_of(const Cell& c) const { return c.x + counts_[0] * (c.y + counts_[1] * c.z); }
+  std::vector<int> order;  // of the samples, by cell
 
-  const std::vector<SurfaceSample>& samples_;
-  double size_;
-  Eigen::Vector3d origin_;
-  std::int64_t counts_[3];
-  std::vector<Entry> entries_;
+ private:
+  Eigen::Vector3i cell_of(const Eigen::Vector3d& p) const {
+    return ((p - low_) / size_).cast<int>().cwiseMin(counts_.array().matrix() - Eigen::Vector3i::Ones());
+  }
+  std::size_t index_of(const Eigen::Vector3i& c) const {
+    return static_cast<std::size_t>(c.x()) +
+           static_cast<std::size_t>(counts_.x()) *
+               (static_cast<std::size_t>(c.y()) +
+                static_cast<std::size_t>(counts_.y()) * static_cast<std::size_t>(c.z()));
+  }
+  void sort(const std::vector<SurfaceSample>& samples) {
+    start_.assign(index_of(counts_.array().matrix() - Eigen::Vector3i::Ones()) + 2, 0);
+    std::vector<std::size_t> cell;
+    for (const SurfaceSample& s : samples) {
+      cell.push_back(index_of(cell_of(s.point)));
+      ++start_[cell.back() + 1];
+    }
+    for (std::size_t i = 1; i < start_.size(); ++i) start_[i] += start_[i - 1];
+    std::vector<int> next(start_.begin(), start_.end() - 1);
+    order.resize(samples.size());
+    for (std::size_t i = 0; i < samples.size(); ++i) order[next[cell[i]]++] = static_cast<int>(i);
+  }
+
+  Eigen::Vector3d low_;
+  double size_ = 0.0;
+  Eigen::Vector3i counts_;
+  std::vector<int> start_;  // per cell and the end, in the order
 };
 
-Neighbours neighbours_within(const std::vector<SurfaceSample>& samples, double radius) {
-  const Cells cells(samples, radius);
+// Of samples in the cells' order, in which neighbours lie near each other in memory.
+Neighbours neighbours_within(const std::vector<SurfaceSample>& samples, const Cells& cells, double radius) {
+  const Eigen::Vector3d& origin = samples.front().point;  // floats are finest near it
+  std::vector<Eigen::Vector3f> points;
+  for (const int i : cells.order) points.push_back((samples[i].point - origin).cast<float>());
+  const auto square_radius = static_cast<float>(radius * radius);
   Neighbours neighbours;
-  for (std::size_t i = 0; i < samples.size(); ++i) {
+  neighbours.start.reserve(samples.size() + 1);
+  neighbours.all.reserve(24 * samples.size());
+  for (int i = 0; i < static_cast<int>(points.size()); ++i) {
     neighbours.start.push_back(static_cast<int>(neighbours.all.size()));
-    cells.around(samples[i].point, [&](int j) {
-      const double square = (samples[j].point - samples[i].point).squaredNorm();
-      if (j == static_cast<int>(i) || !(square < radius * radius)) return;
-      neighbours.all.push_back({j, weight_of(std::sqrt(square), radius)});
+    cells.around(samples[cells.order[i]].point, [&](int first, int last) {
+      for (int j = first; j < last; ++j) {
+        const float square = (points[j] - points[i]).squaredNorm();
+        if (square < square_radius && i != j)
+          neighbours.all.push_back({j, weight_of(std::sqrt(square / square_radius))});
+      }
     });
   }
   neighbours.start.push_back(static_cast<int>(neighbours.all.size()));
@@ -134,13 +156,15 @@ std::vector<bool> eliminate(const Neighbours& neighbours, int samples, int remai
 double densest_spacing(double area, int count) { return std::sqrt(2.0 * area / (std::sqrt(3.0) * count)); }
 
 std::vector<SurfaceSample> sample_surface_evenly(const TriangleMesh& mesh, int count, Rng& rng) {
-  constexpr int kCandidates = 5;  // per point; Yuksel's choice
   if (count <= 0) return {};
   const std::vector<SurfaceSample> candidates = sample_surface(mesh, kCandidates * count, rng);
   // Yuksel's 2 r_max, where r_max is half the densest spacing.
   const double radius = densest_spacing(surface_area(mesh), count);
-  const std::vector<bool> stays =
-      eliminate(neighbours_within(candidates, radius), static_cast<int>(candidates.size()), count);
+  const Cells cells(candidates, radius);
+  const std::vector<bool> stays_in_order =
+      eliminate(neighbours_within(candidates, cells, radius), static_cast<int>(candidates.size()), count);
+  std::vector<bool> stays(candidates.size());
+  for (std::size_t i = 0; i < candidates.size(); ++i) stays[cells.order[i]] = stays_in_order[i];
   std::vector<SurfaceSample> samples;
   samples.reserve(static_cast<std::size_t>(count));
   for (std::size_t i = 0; i < candidates.size(); ++i)

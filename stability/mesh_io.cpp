@@ -1,10 +1,13 @@
 #include "stability/mesh_io.h"
 
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <optional>
+#include <utility>
 
 #include "stability/files.h"
+#include "stability/mesh_holes.h"
 #include "stability/mesh_import.h"
 #include "stability/mesh_topology.h"
 
@@ -59,29 +62,34 @@ TriangleMesh to_metres(const ImportedMesh& file, double unit, const std::string&
   return mesh;
 }
 
-void refuse_holes_and_walls(const TriangleMesh& mesh, double unit, const std::string& path) {
-  const SurfaceFaults faults = surface_faults(mesh);
-  if (faults.open.count > 0) {
-    throw InputError(path + ": the mesh is open: " + place_of(faults.open, unit) +
-                     " belongs to one triangle only; close its holes (or merge vertices that nearly coincide)");
-  }
+[[noreturn]] void refuse_open(const EdgeFault& open, const std::string& extent, double unit, const std::string& path) {
+  throw InputError(path + ": the mesh is open" + extent + ": " + place_of(open, unit) +
+                   " belongs to one triangle only; close its holes (or merge vertices that nearly coincide)");
+}
+
+void refuse_walls(const SurfaceFaults& faults, double unit, const std::string& path) {
   if (faults.odd.count > 0) {
     throw InputError(path + ": the mesh has an inner wall: " + place_of(faults.odd, unit) + " is shared by " +
                      std::to_string(faults.odd.triangles) + " triangles; remove what lies inside the solid");
   }
 }
 
-TriangleMesh wound_outwards(const TriangleMesh& mesh, double unit, const std::string& path) {
-  const std::optional<ConsistentWinding> wound = wound_consistently(mesh);
+ConsistentWinding consistently_wound(const TriangleMesh& mesh, const std::string& path) {
+  std::optional<ConsistentWinding> wound = wound_consistently(mesh);
   if (!wound) throw InputError(path + ": the surface has one side only, as a Moebius strip; it bounds no solid");
-  const SurfaceFaults faults = surface_faults(wound->mesh);
+  return std::move(*wound);
+}
+
+TriangleMesh wound_outwards(const TriangleMesh& mesh, double unit, const std::string& path) {
+  const ConsistentWinding wound = consistently_wound(mesh, path);
+  const SurfaceFaults faults = surface_faults(wound.mesh);
   if (faults.unbalanced.count > 0) {
     throw InputError(path + ": the mesh crosses itself: " + place_of(faults.unbalanced, unit) + " is shared by " +
                      std::to_string(faults.unbalanced.triangles) +
                      " triangles that cannot all face outwards; separate the solids that meet there");
   }
   try {
-    return with_outward_shells(*wound);
+    return with_outward_shells(wound);
   } catch (const std::invalid_argument& e) {
     throw InputError(path + ": " + e.what());
   }
@@ -100,6 +108,14 @@ void refuse_without_volume(const TriangleMesh& mesh, const std::string& path) {
   }
 }
 
+// Of a mesh without holes.
+TriangleMesh solid_of(const TriangleMesh& mesh, const SurfaceFaults& faults, double unit, const std::string& path) {
+  refuse_walls(faults, unit, path);
+  TriangleMesh solid = wound_outwards(mesh, unit, path);
+  refuse_without_volume(solid, path);
+  return solid;
+}
+
 }  // namespace
 
 TriangleMesh read_mesh(const std::string& path, double unit) {
@@ -111,10 +127,40 @@ TriangleMesh read_mesh(const std::string& path, double unit) {
 
 TriangleMesh read_solid_mesh(const std::string& path, double unit) {
   const TriangleMesh mesh = without_repeated_triangles(read_mesh(path, unit));
-  refuse_holes_and_walls(mesh, unit, path);
-  TriangleMesh solid = wound_outwards(mesh, unit, path);
-  refuse_without_volume(solid, path);
-  return solid;
+  const SurfaceFaults faults = surface_faults(mesh);
+  if (faults.open.count > 0) refuse_open(faults.open, "", unit, path);
+  return solid_of(mesh, faults, unit, path);
+}
+
+MendedMesh read_mended_mesh(const std::string& path, double unit) {
+  const TriangleMesh mesh = without_repeated_triangles(read_mesh(path, unit));
+  const SurfaceFaults faults = surface_faults(mesh);
+  MendedMesh mended;
+  if (faults.open.count == 0) {
+    mended.mesh = solid_of(mesh, faults, unit, path);
+    return mended;
+  }
+  refuse_walls(faults, unit, path);
+  const FilledMesh filled = fill_holes(consistently_wound(mesh, path).mesh);
+  if (filled.area_share > kMostOpenShare) {
+    refuse_open(faults.open,
+                " (filling its holes would make " + text_of(std::round(1000.0 * filled.area_share) / 10.0) +
+                    " % of the surface, more than " + text_of(100.0 * kMostOpenShare) + " %)",
+                unit, path);
+  }
+  mended.mesh = solid_of(filled.mesh, surface_faults(filled.mesh), unit, path);
+  mended.holes = filled.holes;
+  mended.open_edges = filled.open_edges;
+  mended.filled_share = filled.area_share;
+  return mended;
+}
+
+std::string mending_note(const std::string& path, const MendedMesh& mended) {
+  if (mended.holes == 0) return "";
+  char share[32];
+  std::snprintf(share, sizeof share, "%.2g %%", 100.0 * mended.filled_share);
+  return path + ": " + std::to_string(mended.holes) + (mended.holes == 1 ? " hole (" : " holes (") +
+         std::to_string(mended.open_edges) + " open edges) filled, " + share + " of the surface";
 }
 
 void check_object_size(const std::string& path, double object_diameter, double unit, const std::string& unit_option) {

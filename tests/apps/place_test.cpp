@@ -1,4 +1,5 @@
 // dofusion-place on a synthetic scan: what it writes is whole, consistent and stands in MuJoCo.
+#include <cmath>
 #include <fstream>
 #include <memory>
 #include <set>
@@ -234,6 +235,17 @@ TEST_F(PlaceTest, QueryMeshInMillimetresKeepsItsOriginOnRecord) {
   const std::vector<double> centre = result.at("query").at("origin_in_file"), expected = {0.02, 0.03, 0.04};
   for (int k = 0; k < 3; ++k) EXPECT_NEAR(centre[k], expected[k], 1e-8);  // the reader has single precision
   EXPECT_NEAR(volume(read_mesh(out() + "/query.obj")), 0.04 * 0.06 * 0.08, 1e-9);
+}
+
+TEST_F(PlaceTest, SmallHolesOfTheQueryAreFilledAndSaid) {
+  write_scan(scan_of(two_blocks(), small_camera()));
+  TriangleMesh open = make_block("cube")->mesh;
+  open.triangles.pop_back();
+  write_obj(open, file("open.obj"));
+  const CommandResult result = place({"--query", file("open.obj")});
+  expect_success(result);
+  EXPECT_NE(result.err.find("open.obj: 1 hole (3 open edges) filled, 8.3 % of the surface"), std::string::npos);
+  EXPECT_NEAR(volume(read_mesh(out() + "/query.obj")), std::pow(0.05, 3), 1e-9);
 }
 
 TEST_F(PlaceTest, OtherFilesInTheOutputFolderStay) {

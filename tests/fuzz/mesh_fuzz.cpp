@@ -7,6 +7,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (size == 0) return 0;
   const char* extensions[] = {".obj", ".stl", ".ply"};
   const int format = data[0] == 'o' ? 0 : data[0] == 's' ? 1 : data[0] == 'p' ? 2 : data[0] % 3;
-  fuzz_file(to_bytes(data + 1, size - 1), extensions[format], [](const std::string& path) { read_solid_mesh(path); });
+  fuzz_file(to_bytes(data + 1, size - 1), extensions[format], [](const std::string& path) { read_mended_mesh(path); });
   return 0;
 }

@@ -1,11 +1,16 @@
 #include "perception/mesh_sdf.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <gtest/gtest.h>
 
+#include "perception/winding_number.h"
 #include "stability/random.h"
+#include "stability/shape_families.h"
 #include "stability/shapes.h"
+#include "tests/sdf_points.h"
 
 namespace dofusion {
 namespace {
@@ -36,18 +41,6 @@ TriangleMesh sphere(double radius, int rings, int sectors) {
     mesh.triangles.push_back({last, index(rings - 1, s + 1), index(rings - 1, s)});
   }
   return mesh;
-}
-
-// The solid angle of the mesh over 4 pi: 1 inside, 0 outside (Van Oosterom and Strackee 1983). Independent of
-// nearest points and pseudonormals.
-double winding_number(const TriangleMesh& mesh, const Eigen::Vector3d& p) {
-  double solid_angle = 0.0;
-  for (const Eigen::Vector3i& t : mesh.triangles) {
-    const Eigen::Vector3d a = mesh.vertices[t[0]] - p, b = mesh.vertices[t[1]] - p, c = mesh.vertices[t[2]] - p;
-    const double la = a.norm(), lb = b.norm(), lc = c.norm();
-    solid_angle += 2.0 * std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
-  }
-  return solid_angle / (4.0 * kPi);
 }
 
 Eigen::Vector3d random_point(Rng& rng, double size) {
@@ -92,7 +85,7 @@ TEST(MeshSdf, SignIsRightBesideCornersAndEdges) {
       for (int i = 0; i < 50; ++i) {
         const Eigen::Vector3d p = feature + random_point(rng, 1e-4);
         if (std::abs(distance(p)) < 1e-9) continue;  // on the surface the winding number has no value
-        EXPECT_EQ(distance(p) < 0.0, winding_number(mesh, p) > 0.5) << name << " at " << p.transpose();
+        EXPECT_EQ(distance(p) < 0.0, plain_winding_number(mesh, p) > 0.5) << name << " at " << p.transpose();
       }
     EXPECT_GT(distance(Eigen::Vector3d(0, 0, 1)), 0.0) << name;
     EXPECT_LT(distance(Eigen::Vector3d::Zero()), 0.0) << name << ": its centre of mass is inside, it is convex";
@@ -125,7 +118,7 @@ TEST(MeshSdf, SignIsRightInTheNotchOfAConcaveSolid) {
   Rng rng = make_rng(4);
   for (int i = 0; i < 2000; ++i) {
     const Eigen::Vector3d p = random_point(rng, 2.5);
-    EXPECT_EQ(distance(p) < 0.0, winding_number(mesh, p) > 0.5) << p.transpose();
+    EXPECT_EQ(distance(p) < 0.0, plain_winding_number(mesh, p) > 0.5) << p.transpose();
   }
 }
 
@@ -162,11 +155,152 @@ TEST(MeshSdf, GridInterpolatesTheDistance) {
   }
 }
 
-TEST(MeshSdf, OpenMeshesAreRefused) {
+TEST(MeshSdf, ManyPointsAtOnceAreThoseOneByOneOnAnyNumberOfThreads) {
+  Rng rng = make_rng(7);
+  const TriangleMesh mesh = with_longest_edge_halved(draw_shape(ShapeFamilyKind::kMug, rng)->mesh);
+  const MeshSdf distance(mesh);
+  std::vector<Eigen::Vector3d> points;
+  for (int i = 0; i < 5000; ++i) points.push_back(random_point(rng, 0.1));
+  const std::vector<double> one = distance.distances(points, 1), three = distance.distances(points, 3);
+  EXPECT_EQ(one, three);
+  for (std::size_t i = 0; i < points.size(); ++i) EXPECT_NEAR(one[i], distance(points[i]), kTolerance);
+  EXPECT_TRUE(distance.distances({}, 2).empty());
+}
+
+TEST(MeshSdf, NoSignIsWrongNearEdgesAndCornersOfTheBlocks) {
+  constexpr int kPointsABlock = 15000;  // sdf_bench --check takes ten times as many
+  for (const std::string& name : block_names()) {
+    const TriangleMesh mesh = block_mesh(name);
+    const std::vector<HalfSpace> planes = half_spaces(mesh);
+    Rng rng = make_rng(8);
+    const std::vector<Eigen::Vector3d> points = points_near_edges(mesh, kPointsABlock, rng);
+    const std::vector<double> distances = MeshSdf(mesh).distances(points);
+    int wrong = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      // Within a few roundings of the surface neither side is certain.
+      if (std::abs(distances[i]) > 1e-15) wrong += (distances[i] < 0) != inside_half_spaces(planes, points[i]);
+    }
+    EXPECT_EQ(wrong, 0) << name;
+  }
+}
+
+TEST(MeshSdf, NoSignIsWrongNearEdgesAndCornersOfHollowShapes) {
+  for (const ShapeFamilyKind kind :
+       {ShapeFamilyKind::kEll, ShapeFamilyKind::kArch, ShapeFamilyKind::kMug, ShapeFamilyKind::kBowl}) {
+    Rng rng = make_rng(9);
+    const TriangleMesh mesh = draw_shape(kind, rng)->mesh;
+    const std::vector<Eigen::Vector3d> points = points_near_edges(mesh, 5000, rng);
+    const std::vector<double> distances = MeshSdf(mesh).distances(points);
+    int wrong = 0;
+    for (std::size_t i = 0; i < points.size(); ++i)
+      if (std::abs(distances[i]) > 1e-12) wrong += (distances[i] < 0) != (plain_winding_number(mesh, points[i]) > 0.5);
+    EXPECT_EQ(wrong, 0) << to_string(kind);
+  }
+}
+
+TEST(MeshSdf, FarPointsAndSuchThatAreNotFinite) {
+  const MeshSdf distance(box_mesh({2, 2, 2}));
+  EXPECT_NEAR(distance({1e9, 0, 0}) / (1e9 - 1), 1.0, 1e-15);
+  EXPECT_NEAR(distance({0, 1e30, 0}) / 1e30, 1.0, 1e-15);
+  const double nan = std::nan(""), infinity = std::numeric_limits<double>::infinity();
+  const std::vector<double> bad = distance.distances({{nan, 0, 0}, {0, 0, 3}, {0, -infinity, 0}});
+  EXPECT_TRUE(std::isnan(bad[0]));
+  EXPECT_NEAR(bad[1], 2.0, kTolerance);
+  EXPECT_TRUE(std::isnan(bad[2]));
+}
+
+// A fine sphere without the triangles within `radius` of its north pole.
+TriangleMesh sphere_with_hole(double hole_radius) {
+  TriangleMesh mesh = sphere(1.0, 40, 80);
+  const auto gone = [&](const Eigen::Vector3i& t) {
+    return (mesh.vertices[t[0]] - Eigen::Vector3d::UnitZ()).norm() < hole_radius;
+  };
+  mesh.triangles.erase(std::remove_if(mesh.triangles.begin(), mesh.triangles.end(), gone), mesh.triangles.end());
+  return mesh;
+}
+
+TEST(MeshSdf, ASmallHoleLeavesTheSignRightAwayFromIt) {
+  const TriangleMesh mesh = sphere_with_hole(0.3);
+  const MeshSdf distance(mesh);
+  EXPECT_FALSE(distance.watertight());
+  EXPECT_EQ(distance.open_edges(), 80u);
+  EXPECT_TRUE(MeshSdf(sphere(1.0, 40, 80)).watertight());
+  Rng rng = make_rng(10);
+  int seen = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const Eigen::Vector3d p = random_point(rng, 1.5);
+    const double depth = p.norm() - 1.0;
+    if (std::abs(depth) < 0.01 || (p - Eigen::Vector3d::UnitZ()).norm() < 0.4) continue;
+    EXPECT_EQ(distance(p) < 0, depth < 0) << p.transpose();
+    ++seen;
+  }
+  EXPECT_GT(seen, 15000);
+  // Close to the surface that is there the sign is right up to the hole's rim.
+  for (const SurfaceSample& s : sample_surface(mesh, 5000, rng)) {
+    EXPECT_GT(distance(s.point + 1e-4 * s.normal), 0.0);
+    EXPECT_LT(distance(s.point - 1e-4 * s.normal), 0.0);
+  }
+}
+
+TEST(MeshSdf, ACubeWithoutATriangleStillHasAnInside) {
   TriangleMesh open = box_mesh({1, 1, 1});
   open.triangles.pop_back();
-  EXPECT_THROW(MeshSdf{open}, std::invalid_argument);
+  const MeshSdf distance(open);
+  EXPECT_EQ(distance.open_edges(), 3u);
+  EXPECT_NEAR(distance({0.1, 0.05, 0.0}), -0.4, 0.11);  // to whichever face is there
+  EXPECT_LT(distance({0.0, 0.0, 0.0}), 0.0);
+  for (const Eigen::Vector3d& p : {Eigen::Vector3d(0.6, 0.1, 0.2), Eigen::Vector3d(-0.6, 0.1, 0.2),
+                                   Eigen::Vector3d(0.1, 0.9, 0.2), Eigen::Vector3d(0.1, 0.2, -0.9)})
+    EXPECT_GT(distance(p), 0.0);
+}
+
+TEST(MeshSdf, WhatIsClearlyOpenOrHasNoInsideIsRefused) {
   EXPECT_THROW(MeshSdf{TriangleMesh{}}, std::invalid_argument);
+  const auto top = [](const TriangleMesh& mesh, double height) {  // what lies below it
+    TriangleMesh part{mesh.vertices, {}};
+    for (const Eigen::Vector3i& t : mesh.triangles)
+      if (std::max({mesh.vertices[t[0]].z(), mesh.vertices[t[1]].z(), mesh.vertices[t[2]].z()}) < height)
+        part.triangles.push_back(t);
+    return part;
+  };
+  EXPECT_THROW(MeshSdf{top(sphere(1.0, 40, 80), 0.0)}, std::invalid_argument) << "half a sphere";
+  EXPECT_THROW(MeshSdf{top(sphere(1.0, 40, 80), 0.6)}, std::invalid_argument) << "a cup of no thickness";
+  const TriangleMesh sheet{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}};
+  EXPECT_THROW(MeshSdf{sheet}, std::invalid_argument);
+  TriangleMesh flipped = box_mesh({1, 1, 1});
+  std::swap(flipped.triangles[0][0], flipped.triangles[0][1]);
+  EXPECT_THROW(MeshSdf{flipped}, std::invalid_argument);
+}
+
+TEST(MeshSdf, AGridIsTheSameOnAnyNumberOfThreadsAndNearTheExactDistance) {
+  Rng rng = make_rng(11);
+  const TriangleMesh mesh = draw_shape(ShapeFamilyKind::kMug, rng)->mesh;
+  const SdfGrid grid = mesh_to_sdf_grid(mesh, {}, 1);
+  EXPECT_EQ(grid.values, mesh_to_sdf_grid(mesh, {}, 3).values);
+  const MeshSdf distance(mesh);
+  const std::vector<Eigen::Vector3d> nodes = node_positions(grid);
+  for (std::size_t i = 0; i < nodes.size(); i += 97) EXPECT_NEAR(grid.values[i], distance(nodes[i]), 1e-7);
+  // The bound of the declaration, and what is usual: edges and the middle of thin walls are where it errs most.
+  std::vector<double> errors;
+  for (const SurfaceSample& s : sample_surface(mesh, 4000, rng)) {
+    const Eigen::Vector3d p = s.point + normal3(rng, grid.spacing);
+    errors.push_back(std::abs(grid(p) - distance(p)));
+    EXPECT_LE(errors.back(), 0.5 * std::sqrt(3.0) * grid.spacing + 1e-7);
+  }
+  std::sort(errors.begin(), errors.end());
+  EXPECT_LT(errors[errors.size() / 2], 0.1 * grid.spacing);
+  EXPECT_LT(errors[errors.size() * 95 / 100], 0.4 * grid.spacing);
+}
+
+TEST(WindingNumber, IsThatOfAllTrianglesWithinItsError) {
+  for (const TriangleMesh& mesh : {sphere(1.0, 40, 80), sphere_with_hole(0.4)}) {
+    const WindingNumber fast(mesh);
+    Rng rng = make_rng(12);
+    for (int i = 0; i < 2000; ++i) {
+      const Eigen::Vector3d p = random_point(rng, 1.5);
+      EXPECT_NEAR(fast(p), plain_winding_number(mesh, p), 0.02) << p.transpose();
+    }
+  }
 }
 
 }  // namespace

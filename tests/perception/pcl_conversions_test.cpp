@@ -5,6 +5,7 @@
 #include "box_image.h"
 #include "perception/segmentation.h"
 #include "stability/files.h"
+#include "stability/shapes.h"
 
 namespace dofusion {
 namespace {
@@ -40,6 +41,21 @@ TEST(PclConversions, AnUnorganisedCloudIsSegmented) {
   const std::optional<Table> table = find_table(view->depth, view->camera);
   ASSERT_TRUE(table);
   EXPECT_EQ(count_objects(segment(view->depth, view->camera, *table)), 2);
+}
+
+TEST(PclConversions, AnObjectsCloudLiesEvenlyOnItsSurface) {
+  const ObjectPtr cube = make_block("cube");  // 50 mm
+  const SurfaceCloud cloud = to_cloud(*cube, 600, 3);
+  ASSERT_EQ(cloud.size(), 600u);
+  int on_top = 0;
+  for (const pcl::PointNormal& p : cloud) {
+    const Eigen::Vector3f point = p.getVector3fMap(), normal = p.getNormalVector3fMap();
+    EXPECT_NEAR(point.cwiseAbs().maxCoeff(), 0.025, 1e-7);
+    EXPECT_NEAR(point.dot(normal), 0.025, 1e-7);
+    on_top += normal.z() > 0.5F;
+  }
+  EXPECT_NEAR(on_top, 100, 10);
+  EXPECT_EQ(to_cloud(*cube, 600, 3).points[5].x, cloud.points[5].x);
 }
 
 TEST(PclConversions, DegenerateCloudsGiveNothing) {

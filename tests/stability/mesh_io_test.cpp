@@ -100,6 +100,42 @@ TEST(MeshIo, AHoleIsShownInTheFilesOwnCoordinates) {
   }
 }
 
+TEST(MeshIo, SmallHolesAreFilledWhereThatIsAskedForAndNoted) {
+  const TemporaryDirectory directory;
+  TriangleMesh open = box_mesh({40, 40, 40});  // millimetres
+  open.triangles.pop_back();
+  std::swap(open.triangles[3][0], open.triangles[3][1]);  // flipped as well
+  write_text(directory / "open.obj", open);
+  const MendedMesh mended = read_mended_mesh(directory / "open.obj", 0.001);
+  EXPECT_TRUE(is_closed(mended.mesh));
+  EXPECT_NEAR(volume(mended.mesh), 64e-6, 1e-11);
+  EXPECT_EQ(mended.holes, 1u);
+  EXPECT_EQ(mending_note("open.obj", mended).rfind("open.obj: 1 hole (3 open edges) filled, ", 0), 0u);
+  write_text(directory / "closed.obj", box_mesh({40, 40, 40}));
+  EXPECT_EQ(mending_note("closed.obj", read_mended_mesh(directory / "closed.obj")), "");
+}
+
+TEST(MeshIo, WhatIsClearlyOpenIsNotFilled) {
+  const TemporaryDirectory directory;
+  TriangleMesh cup = box_mesh({1, 1, 1});
+  cup.triangles.erase(std::remove_if(cup.triangles.begin(), cup.triangles.end(),
+                                     [&](const Eigen::Vector3i& t) {
+                                       return cup.vertices[t[0]].z() > 0 && cup.vertices[t[1]].z() > 0 &&
+                                              cup.vertices[t[2]].z() > 0;
+                                     }),
+                      cup.triangles.end());
+  write_text(directory / "cup.obj", cup);
+  try {
+    read_mended_mesh(directory / "cup.obj");
+    FAIL();
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), testing::AllOf(testing::HasSubstr("cup.obj: the mesh is open"), testing::HasSubstr("16.7 %"),
+                                         testing::HasSubstr("more than 10 %"), testing::HasSubstr("close its holes")));
+  }
+  write_file(directory / "sheet.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  EXPECT_THROW(read_mended_mesh(directory / "sheet.obj"), InputError);
+}
+
 TEST(MeshIo, FlippedAndRepeatedTrianglesAreRepaired) {
   const TemporaryDirectory directory;
   TriangleMesh mesh = sphere_mesh(1.0);
