@@ -86,6 +86,7 @@ PngHeader check_png(const std::string& bytes, const std::string& path) {
     if (checksum(&bytes[at + 4], length + 4) != big_endian(bytes, data + length))
       throw InputError(path + ": the PNG is damaged (checksum of chunk at byte " + std::to_string(at) +
                        "); copy or export it again");
+    if (at > kSignatureSize && type == "IHDR") throw InputError(path + ": the PNG is damaged (a second header)");
     if (at == kSignatureSize) {
       if (type != "IHDR" || length != 13) throw InputError(path + ": the PNG is damaged (no header)");
       header.width = static_cast<int>(std::min(big_endian(bytes, data), 0x7FFFFFFFu));
