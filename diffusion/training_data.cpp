@@ -6,7 +6,7 @@
 #include "diffusion/schedule.h"
 #include "diffusion/se3_noise.h"
 #include "stability/files.h"
-#include "stability/mesh_symmetry.h"
+#include "stability/shape_symmetry.h"
 
 namespace dofusion {
 namespace {
@@ -35,9 +35,10 @@ TrainingSet::TrainingSet(std::vector<SceneDataset> datasets, const ModelConfig& 
   for (SceneDataset& dataset : datasets) {
     const int first = static_cast<int>(shapes_.size());
     for (const ObjectPtr& object : dataset.shapes) {
-      std::vector<Eigen::Matrix3d> symmetries;
-      if (config_.equivalent) symmetries = rotation_symmetries(object->mesh);
-      shapes_.push_back({object, object->convex && mirrors_in_y(object->mesh), std::move(symmetries)});
+      constexpr double kExact = 1e-3;  // of the diameter: what is only nearly alike is not the same
+      ShapeSymmetry symmetry;
+      if (config_.equivalent) symmetry = symmetry_of(*object, kExact);
+      shapes_.push_back({object, object->convex && mirrors_in_y(object->mesh), std::move(symmetry)});
     }
     for (SceneRecord& record : dataset.scenes) {
       for (SceneObject& object : record.objects) {
@@ -63,30 +64,32 @@ CloudShapePtr TrainingSet::cloud_shape(const Shape& shape, const Eigen::Vector3d
 // poses, which the network would learn instead, means nothing.
 Pose TrainingSet::nearest_equivalent(const Shape& shape, const Eigen::Vector3d& scale, const Pose& clean,
                                      const Pose& noisy) const {
+  // A stretched shape keeps the rotations that stretching leaves rotations.
+  const auto survives = [&](const Eigen::Matrix3d& R) {
+    return (scale.asDiagonal() * R * scale.cwiseInverse().asDiagonal() - R).norm() < 1e-6;
+  };
+  const ShapeSymmetry& symmetry = shape.symmetry;
   Pose nearest = clean;
+  if (symmetry.ball && scale.isConstant(scale.x(), 1e-6)) {
+    nearest.linear() = noisy.linear();
+    return nearest;
+  }
+  std::optional<Eigen::Vector3d> axis = symmetry.axis;
+  if (axis && !survives(Eigen::AngleAxisd(1.0, *axis).toRotationMatrix())) axis.reset();
   const auto likeness = [&](const Eigen::Matrix3d& R) { return (noisy.linear().transpose() * R).trace(); };
-  double best = likeness(clean.linear());
-  const auto consider = [&](const Eigen::Matrix3d& R) {
+  double best = -1e9;
+  const auto consider = [&](Eigen::Matrix3d R) {
+    if (axis) {  // turned about the axis to where it is most alike: the twist of the rest of the way
+      const Eigen::Quaterniond rest(R.transpose() * noisy.linear());
+      R *= Eigen::AngleAxisd(2.0 * std::atan2(rest.vec().dot(*axis), rest.w()), *axis).toRotationMatrix();
+    }
     if (likeness(R) <= best) return;
     best = likeness(R);
     nearest.linear() = R;
   };
-  if (shape.object->kind == SolidKind::kSphere) {
-    consider(noisy.linear());
-  } else if (shape.object->kind == SolidKind::kCylinder) {
-    for (const double flip : {0.0, M_PI}) {
-      const Eigen::Matrix3d R = clean.linear() * Eigen::AngleAxisd(flip, Eigen::Vector3d::UnitX()).toRotationMatrix();
-      const Eigen::Matrix3d M = noisy.linear().transpose() * R;
-      const double turn = std::atan2(M(0, 1) - M(1, 0), M(0, 0) + M(1, 1));
-      consider(R * Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ()).toRotationMatrix());
-    }
-  } else {
-    for (const Eigen::Matrix3d& symmetry : shape.symmetries) {
-      // A stretched shape keeps the rotations that stretching leaves rotations.
-      const Eigen::Matrix3d stretched = scale.asDiagonal() * symmetry * scale.cwiseInverse().asDiagonal();
-      if ((stretched - symmetry).norm() < 1e-6) consider(clean.linear() * symmetry);
-    }
-  }
+  consider(clean.linear());
+  for (const Eigen::Matrix3d& R : symmetry.rotations)
+    if (survives(R)) consider(clean.linear() * R);
   return nearest;
 }
 

@@ -10,6 +10,7 @@
 #include "diffusion/config.h"
 #include "diffusion/network.h"
 #include "stability/dataset.h"
+#include "stability/shape_symmetry.h"
 
 namespace dofusion {
 
@@ -28,7 +29,7 @@ class TrainingSet {
   struct Shape {
     ObjectPtr object;      // at scale 1
     bool mirrors = false;  // its own mirror image in y
-    std::vector<Eigen::Matrix3d> symmetries;
+    ShapeSymmetry symmetry;  // of config.equivalent
   };
   CloudShapePtr cloud_shape(const Shape& shape, const Eigen::Vector3d& scale) const;
   Pose nearest_equivalent(const Shape& shape, const Eigen::Vector3d& scale, const Pose& clean, const Pose& noisy) const;

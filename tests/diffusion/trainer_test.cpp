@@ -9,6 +9,7 @@
 #include <gmock/gmock.h>
 
 #include "diffusion/sampler.h"
+#include "diffusion/se3_noise.h"
 #include "diffusion/weights.h"
 #include "stability/files.h"
 #include "tests/diffusion/toy_scenes.h"
@@ -195,6 +196,40 @@ TEST_F(TrainerTest, DivergenceStopsAndKeepsTheLastGoodState) {
     EXPECT_THAT(error.what(), HasSubstr("not finite"));
   }
   EXPECT_NO_THROW(read_model(options_.out));
+}
+
+// Of a cube's 24 equal poses one is never farther than 62.8 degrees; a cylinder's nearest one differs in its axis
+// alone, at most 90 degrees. Without the option targets go all the way.
+TEST_F(TrainerTest, TargetsAreTheNearestOfEqualPoses) {
+  for (const ObjectPtr& shape : {make_block("cube"), make_cylinder("can", 0.03, 0.05)}) {
+    SceneDataset dataset;
+    dataset.shapes = {shape};
+    SceneRecord record;
+    SceneObject object;
+    object.T_world_object = make_pose(Eigen::Matrix3d::Identity(), {0, 0, 0.025});
+    record.objects = {object};
+    dataset.scenes = {record};
+    const double limit = shape->name == "cube" ? 62.9 : 90.1;
+    for (const bool equivalent : {false, true}) {
+      ModelConfig config = small_config();
+      config.equivalent = equivalent;
+      config.sigma_min = 1.9;
+      config.sigma_max = 2.0;
+      const TrainingSet data({dataset}, config);
+      double largest = 0.0;
+      for (std::uint64_t i = 0; i < 500; ++i) {
+        NetworkInput input;
+        std::vector<float> target;
+        data.append(1, i, input, target);
+        const Eigen::Vector3d turn(target[3], target[4], target[5]);
+        largest = std::max(largest, turn.norm() * rotation_scale(input.sigma[0]) * 180.0 / M_PI);
+      }
+      if (equivalent)
+        EXPECT_LT(largest, limit) << shape->name;
+      else
+        EXPECT_GT(largest, 150.0) << shape->name;
+    }
+  }
 }
 
 TEST_F(TrainerTest, BadDataIsRefused) {
