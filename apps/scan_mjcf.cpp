@@ -1,7 +1,6 @@
 #include "apps/scan_mjcf.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "stability/files.h"
 #include "stability/geom_mesh.h"
@@ -41,8 +40,10 @@ std::vector<Pose> poses_of(const MjcfScene& file, const MjcfScanOptions& options
   return file.poses(result.T_world_object);
 }
 
-Camera with_field_of_view(Camera camera, double fovy) {
-  camera.fx = camera.fy = 0.5 * camera.height / std::tan(0.5 * fovy);
+// As high as the file's camera sees, in the image that was asked for.
+Camera image_of(const SceneCamera& from, const Camera& wanted) {
+  Camera camera = camera_of_fovy(from.fovy, wanted.width, wanted.height);
+  camera.depth_scale = wanted.depth_scale;
   return camera;
 }
 
@@ -54,7 +55,7 @@ std::vector<ScanView> views_of(const MjcfScene& file, const MjcfScanOptions& opt
   for (const SceneCamera& each : file.cameras()) {
     known += (known.empty() ? "" : ", ") + (each.name.empty() ? "one without a name" : each.name);
     if (options.camera != "all" && options.camera != each.name) continue;
-    views.push_back({with_field_of_view(camera, each.fovy), camera_pose(each, poses)});
+    views.push_back({image_of(each, camera), camera_pose(each, poses)});
   }
   if (known.empty()) throw InputError(options.file + ": has no camera; leave --camera out to look from all around");
   if (views.empty()) throw InputError("--camera: " + options.file + " has no '" + options.camera + "', but " + known);

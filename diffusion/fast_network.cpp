@@ -128,10 +128,9 @@ struct FastNetwork::Impl {
     if (config.point_head == 0) return;
     PointHead::Offsets offsets;
     offsets.local = add("head.local.weight", {encoder->channels(), config.point_head});
-    offsets.scene = add("head.scene.weight", {config.hidden, config.point_head});
+    head_scene = add("head.scene.weight", {config.hidden, config.point_head});
     offsets.bias = add("head.bias", {config.point_head});
     offsets.force = add("head.force.weight", {config.point_head, 3});
-    head_scene = offsets.scene;
     head_bias = offsets.bias;
     head = std::make_unique<PointHead>(config, kernels, encoder->channels(), offsets);
   }

@@ -18,7 +18,6 @@ class PointHead {
  public:
   struct Offsets {
     std::size_t local = 0;  // (S, H)
-    std::size_t scene = 0;  // (G, H)
     std::size_t bias = 0;   // (H)
     std::size_t force = 0;  // (H, 3)
   };

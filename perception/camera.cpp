@@ -41,6 +41,19 @@ int size_field(const json& object, const char* name, const std::string& path) {
 
 }  // namespace
 
+Camera camera_of_fovy(double fovy, int width, int height) {
+  if (!(fovy > 0.0 && fovy < M_PI) || width <= 0 || height <= 0)
+    throw std::invalid_argument("no camera has a field of view of " + std::to_string(fovy) + " radians and " +
+                                std::to_string(width) + "x" + std::to_string(height) + " pixels");
+  Camera camera;
+  camera.fx = camera.fy = 0.5 * height / std::tan(0.5 * fovy);
+  camera.cx = 0.5 * (width - 1);  // pixel centres are at integers
+  camera.cy = 0.5 * (height - 1);
+  camera.width = width;
+  camera.height = height;
+  return camera;
+}
+
 Pose look_at(const Eigen::Vector3d& eye, const Eigen::Vector3d& target) {
   const Eigen::Vector3d view = target - eye;
   const Eigen::Vector3d right = view.cross(Eigen::Vector3d::UnitZ());

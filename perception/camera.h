@@ -26,6 +26,10 @@ inline Eigen::Vector2d project(const Camera& camera, const Eigen::Vector3d& p) {
   return {camera.fx * p.x() / p.z() + camera.cx, camera.fy * p.y() / p.z() + camera.cy};
 }
 
+// A camera with square pixels whose image is `fovy` radians high (SceneCamera::fovy), the principal point in its
+// middle. Throws std::invalid_argument unless the angle lies between 0 and pi and the size is positive.
+Camera camera_of_fovy(double fovy, int width, int height);
+
 // T_world_camera of a camera at `eye` that looks at `target` with the image's up along world z (both in metres;
 // throws std::invalid_argument if they coincide or the view is along z).
 Pose look_at(const Eigen::Vector3d& eye, const Eigen::Vector3d& target);

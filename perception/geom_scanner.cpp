@@ -346,19 +346,6 @@ AngleImage incidence_angles(const NormalImage& normals, const Camera& camera) {
   return angles;
 }
 
-Camera camera_of_fovy(double fovy, int width, int height) {
-  if (!(fovy > 0.0 && fovy < M_PI) || width <= 0 || height <= 0)
-    throw std::invalid_argument("no camera has a field of view of " + std::to_string(fovy) + " radians and " +
-                                std::to_string(width) + "x" + std::to_string(height) + " pixels");
-  Camera camera;
-  camera.fx = camera.fy = 0.5 * height / std::tan(0.5 * fovy);
-  camera.cx = 0.5 * (width - 1);  // pixel centres are at integers
-  camera.cy = 0.5 * (height - 1);
-  camera.width = width;
-  camera.height = height;
-  return camera;
-}
-
 Scan labelled(const GeomScan& scan, const std::vector<std::uint8_t>& label_of_body) {
   Scan result{scan.depth, LabelImage(scan.depth.width, scan.depth.height), scan.normals};
   for (std::size_t i = 0; i < scan.bodies.pixels.size(); ++i) {

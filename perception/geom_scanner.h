@@ -14,9 +14,6 @@
 
 namespace dofusion {
 
-using IdImage = Image<std::int32_t>;  // indices; -1 nothing
-using AngleImage = Image<float>;      // radians
-
 struct GeomScan {
   DepthImage depth;     // z-depth, metres, exact; 0 where nothing is hit
   IdImage geoms;        // index of the geom that is seen; -1 nothing
@@ -81,9 +78,5 @@ Scan labelled(const GeomScan& scan, const std::vector<std::uint8_t>& label_of_bo
 // The angle between the surface's normal and the direction to the camera at every pixel, in [0, pi]; above pi / 2 a
 // surface is seen from behind. 0 where the normal is zero: nothing is seen.
 AngleImage incidence_angles(const NormalImage& normals, const Camera& camera);
-
-// A camera with square pixels whose image is `fovy` radians high (SceneCamera::fovy), the principal point in its
-// middle. Throws std::invalid_argument unless the angle lies between 0 and pi and the size is positive.
-Camera camera_of_fovy(double fovy, int width, int height);
 
 }  // namespace dofusion

@@ -26,6 +26,8 @@ struct Image {
 using DepthImage = Image<float>;         // z-depth in metres; 0 = no reading
 using LabelImage = Image<std::uint8_t>;  // 0 nothing, 1 table, 2 + i object i
 using NormalImage = Image<Eigen::Vector3f>;
+using IdImage = Image<std::int32_t>;  // indices; -1 nothing
+using AngleImage = Image<float>;      // radians
 
 inline constexpr std::uint8_t kLabelNothing = 0;
 inline constexpr std::uint8_t kLabelTable = 1;

@@ -12,8 +12,8 @@ namespace dofusion {
 // most others around them are eliminated, one after another (Yuksel, "Sample Elimination for Generating Poisson Disk
 // Sample Sets", 2015). Distances are straight ones, so that the two sides of a thin plate keep apart as well. As
 // uniform in area as sample_surface and much evener: no two points come nearer than about 0.65 of the distance in the
-// densest packing. Same seed, same points, in random
-// order. O(count log count). Throws std::invalid_argument if the mesh has no surface.
+// densest packing. Same seed, same points, in random order. O(count log count). Throws std::invalid_argument if the
+// mesh has no surface.
 std::vector<SurfaceSample> sample_surface_evenly(const TriangleMesh& mesh, int count, Rng& rng);
 
 // The distance between neighbours if `count` points were packed as densely as they can be on a plane of this area,

@@ -59,9 +59,8 @@ class MjcfScene {
   // The free bodies as uniform solids on the table z = 0, for the toolkit's own physics, at their initial poses or at
   // those of a SettleResult. Of the file's masses, friction and solver settings nothing remains.
   //   An object is what can be touched of a body with a free joint and of those fixed to it. One box, cylinder or
-  //   sphere
-  // stays what it is, in its geom's frame. Anything else has its body's orientation: one geom is a mesh, several are
-  // one mesh of several closed shells with the geoms as its convex parts. Geoms that lie within another one, to a
+  // sphere stays what it is, in its geom's frame. Anything else has its body's orientation: one geom is a mesh, several
+  // are one mesh of several closed shells with the geoms as its convex parts. Geoms that lie within another one, to a
   // thousandth of the object's diameter, are left out.
   //   Throws InputError naming the file and the body: if something fixed can be touched but for planes at z = 0, or
   // there is no such plane; if there are joints other than free ones, constraints, tendons or actuators; if gravity

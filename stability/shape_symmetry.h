@@ -27,9 +27,8 @@ struct ShapeSymmetry {
 //   Complete for solids of revolution, balls, and meshes of at most 400 corners (points where the surface bends in more
 // than one direction). Of meshes of more corners those about the principal axes are found: turns by 1/2 ... 1/12 about
 // the one whose moment differs from two equal ones, half turns about all three.
-//   The mesh may be in any frame, open or closed, however it was cut into triangles; `centre` is the surface's centre
-//   of
-// area, which every symmetry keeps. Throws std::invalid_argument if it has no area.
+//   The mesh may be in any frame, open or closed, however it was cut into triangles; `centre` is the centre of the
+// surface's area, which every symmetry keeps. Throws std::invalid_argument if it has no area.
 ShapeSymmetry symmetry_of(const TriangleMesh& mesh, double tolerance = 0.01);
 
 // The same of an object, about its origin, which is its centre of mass. Of cylinders and spheres it is exact.

@@ -4,149 +4,28 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <iomanip>
-#include <limits>
 #include <map>
 #include <set>
-#include <sstream>
 
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "tests/apps/bop_files.h"
 #include "tests/apps/run_command.h"
+#include "tests/apps/silhouette.h"
 #include "tests/temporary_directory.h"
 
+namespace dofusion::bop {
 namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-constexpr double kFar = std::numeric_limits<double>::infinity();
-
-std::string six(int number) {
-  std::ostringstream text;
-  text << std::setw(6) << std::setfill('0') << number;
-  return text.str();
-}
-
-json read_json(const fs::path& file) {
-  std::ifstream stream(file);
-  EXPECT_TRUE(stream) << file;
-  return json::parse(stream);
-}
-
-std::set<std::string> keys(const json& object) {
-  std::set<std::string> names;
-  for (const auto& [key, value] : object.items()) names.insert(key);
-  return names;
-}
-
-std::set<std::string> names_in(const fs::path& folder) {
-  std::set<std::string> names;
-  for (const auto& entry : fs::directory_iterator(folder)) names.insert(entry.path().filename().string());
-  return names;
-}
-
-// Three numbers, or nine row by row.
-Eigen::Vector3d vector(const json& values) {
-  EXPECT_EQ(values.size(), 3u);
-  return {values[0].get<double>(), values[1].get<double>(), values[2].get<double>()};
-}
-
-Eigen::Matrix3d matrix(const json& values) {
-  EXPECT_EQ(values.size(), 9u);
-  Eigen::Matrix3d m;
-  for (int k = 0; k < 9; ++k) m(k / 3, k % 3) = values[static_cast<std::size_t>(k)].get<double>();
-  return m;
-}
-
 void expect_rotation(const Eigen::Matrix3d& R) {
   EXPECT_LT((R * R.transpose() - Eigen::Matrix3d::Identity()).norm(), 1e-9);
   EXPECT_GT(R.determinant(), 0.0);  // right-handed frames
-}
-
-// Millimetres.
-struct Model {
-  std::vector<Eigen::Vector3d> vertices, normals;
-  std::vector<std::array<int, 3>> triangles;
-};
-
-// PLY in ASCII, with the vertices' normals.
-Model read_ply(const fs::path& file) {
-  std::ifstream stream(file);
-  std::string line, header;
-  std::size_t vertices = 0, faces = 0;
-  while (std::getline(stream, line) && line != "end_header") {
-    header += line + "\n";
-    if (line.rfind("element vertex ", 0) == 0) vertices = std::stoul(line.substr(15));
-    if (line.rfind("element face ", 0) == 0) faces = std::stoul(line.substr(13));
-  }
-  EXPECT_EQ(header.rfind("ply\nformat ascii 1.0\n", 0), 0u) << file;
-  EXPECT_NE(header.find("float x\nproperty float y\nproperty float z\nproperty float nx"), std::string::npos);
-  Model model;
-  for (std::size_t i = 0; i < vertices; ++i) {
-    Eigen::Vector3d v, n;
-    stream >> v[0] >> v[1] >> v[2] >> n[0] >> n[1] >> n[2];
-    model.vertices.push_back(v);
-    model.normals.push_back(n);
-  }
-  for (std::size_t i = 0; i < faces; ++i) {
-    int corners = 0;
-    std::array<int, 3> t{};
-    stream >> corners >> t[0] >> t[1] >> t[2];
-    EXPECT_EQ(corners, 3);
-    model.triangles.push_back(t);
-  }
-  EXPECT_FALSE(stream.fail()) << file;
-  return model;
-}
-
-// Undoes LZF: runs of literal bytes, and copies of what came before.
-std::string lzf_decoded(const std::string& data) {
-  std::string out;
-  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(data.at(i)); };
-  for (std::size_t i = 0; i < data.size();) {
-    const std::size_t control = byte(i++);
-    if (control < 32) {
-      out.append(data, i, control + 1);
-      i += control + 1;
-      continue;
-    }
-    std::size_t length = control >> 5;
-    if (length == 7) length += byte(i++);
-    const std::size_t from = out.size() - ((control & 31) << 8) - byte(i++) - 1;
-    for (std::size_t k = 0; k < length + 2; ++k) out.push_back(out.at(from + k));
-  }
-  return out;
-}
-
-// An organised PCD file, binary_compressed: all x, then all y, then all z, packed by LZF.
-std::vector<float> read_pcd(const fs::path& file, int width, int height) {
-  std::ifstream stream(file, std::ios::binary);
-  std::string line, header;
-  while (std::getline(stream, line)) {
-    header += line + "\n";
-    if (line.rfind("DATA", 0) == 0) break;
-  }
-  EXPECT_EQ(line, "DATA binary_compressed");
-  EXPECT_NE(header.find("FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\n"), std::string::npos) << header;
-  EXPECT_NE(header.find("WIDTH " + std::to_string(width) + "\nHEIGHT " + std::to_string(height)), std::string::npos)
-      << header;
-  std::array<std::uint32_t, 2> sizes{};  // packed and not
-  stream.read(reinterpret_cast<char*>(sizes.data()), sizeof sizes);
-  std::string packed(sizes[0], '\0');
-  stream.read(packed.data(), static_cast<std::streamsize>(packed.size()));
-  EXPECT_FALSE(stream.fail()) << file;
-  const std::string bytes = lzf_decoded(packed);
-  EXPECT_EQ(bytes.size(), sizes[1]);
-  std::vector<float> values(bytes.size() / sizeof(float));
-  std::memcpy(values.data(), bytes.data(), values.size() * sizeof(float));
-  return values;
 }
 
 // Distance from a point to a triangle's plane where the point projects into it, else to its edges.
@@ -177,55 +56,6 @@ double farthest_off(const Model& model, const Eigen::Matrix3d& R, const Eigen::V
   }
   return farthest;
 }
-
-struct View {
-  Eigen::Matrix3d K;
-  int width = 0, height = 0;
-};
-
-// z-depth in mm of a model over the image and one image's size around it on each side: BOP's silhouettes go on there.
-class Silhouette {
- public:
-  Silhouette(const Model& model, const Eigen::Matrix3d& R, const Eigen::Vector3d& t, const View& view)
-      : view_(view), depth_(static_cast<std::size_t>(9 * view.width * view.height), kFar) {
-    for (const auto& i : model.triangles) {
-      draw(R * model.vertices[i[0]] + t, R * model.vertices[i[1]] + t, R * model.vertices[i[2]] + t);
-    }
-  }
-  // u in [-width, 2 width), v in [-height, 2 height)
-  double& at(int u, int v) {
-    return depth_[static_cast<std::size_t>((v + view_.height) * 3 * view_.width + u + view_.width)];
-  }
-
- private:
-  void draw(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
-    const Eigen::Vector3d n = (b - a).cross(c - a);
-    Eigen::Vector2d low(kFar, kFar), high(-kFar, -kFar);
-    for (const Eigen::Vector3d& p : {a, b, c}) {
-      const Eigen::Vector2d pixel = (view_.K * p).hnormalized();
-      low = low.cwiseMin(pixel);
-      high = high.cwiseMax(pixel);
-    }
-    const int u0 = std::max(-view_.width, static_cast<int>(std::ceil(low.x())));
-    const int u1 = std::min(2 * view_.width - 1, static_cast<int>(std::floor(high.x())));
-    const int v0 = std::max(-view_.height, static_cast<int>(std::ceil(low.y())));
-    const int v1 = std::min(2 * view_.height - 1, static_cast<int>(std::floor(high.y())));
-    const Eigen::Matrix3d K_inverse = view_.K.inverse();
-    for (int v = v0; v <= v1; ++v) {
-      for (int u = u0; u <= u1; ++u) {
-        const Eigen::Vector3d ray = K_inverse * Eigen::Vector3d(u, v, 1.0);  // to depth 1
-        const double s0 = ray.dot(a.cross(b)), s1 = ray.dot(b.cross(c)), s2 = ray.dot(c.cross(a));
-        const bool hit = (s0 <= 0.0 && s1 <= 0.0 && s2 <= 0.0) || (s0 >= 0.0 && s1 >= 0.0 && s2 >= 0.0);
-        if (!hit || n.dot(ray) == 0.0) continue;
-        double& z = at(u, v);
-        z = std::min(z, n.dot(a) / n.dot(ray));
-      }
-    }
-  }
-
-  View view_;
-  std::vector<double> depth_;
-};
 
 struct Box {
   int u0 = 1 << 20, v0 = 1 << 20, u1 = -(1 << 20), v1 = -(1 << 20);
@@ -503,10 +333,10 @@ class Dataset {
 };
 
 TEST(BopFormat, FiftyImagesOfBlocks) {
-  const dofusion::TemporaryDirectory directory;
-  dofusion::expect_success(dofusion::run_command(
-      "dofusion-scan", {"--task", "unstructured", "--objects", "3", "--count", "10", "--cameras", "5", "--sensor",
-                        "none", "--size", "320", "240", "--seed", "77", "--pcd", "--out", directory / "bop"}));
+  const TemporaryDirectory directory;
+  expect_success(run_command("dofusion-scan",
+                             {"--task", "unstructured", "--objects", "3", "--count", "10", "--cameras", "5", "--sensor",
+                              "none", "--size", "320", "240", "--seed", "77", "--pcd", "--out", directory / "bop"}));
   Dataset dataset(directory / "bop", true, true);
   dataset.check_camera();
   EXPECT_GT(dataset.check_models(), 0);
@@ -514,8 +344,8 @@ TEST(BopFormat, FiftyImagesOfBlocks) {
 }
 
 TEST(BopFormat, NoisyImagesOfGeneralShapes) {
-  const dofusion::TemporaryDirectory directory;
-  dofusion::expect_success(dofusion::run_command(
+  const TemporaryDirectory directory;
+  expect_success(run_command(
       "dofusion-scan", {"--task", "unstructured", "--objects", "2", "--shapes", "general", "--count", "12", "--sensor",
                         "kinect", "--size", "320", "240", "--seed", "78", "--out", directory / "bop"}));
   Dataset dataset(directory / "bop", false, false);
@@ -525,3 +355,4 @@ TEST(BopFormat, NoisyImagesOfGeneralShapes) {
 }
 
 }  // namespace
+}  // namespace dofusion::bop

@@ -5,59 +5,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/perception/plane_scans.h"
+
 namespace dofusion {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
-constexpr double kDegree = kPi / 180.0;
-
-const Camera kCamera{600.0, 600.0, 99.5, 99.5, 200, 200, 0.1};
-constexpr int kPixels = 200 * 200;
-
-// The scan of a plane through the optical axis at `depth`, tilted by `tilt` radians about the image's y axis.
-Scan plane_scan(double depth, double tilt = 0.0) {
-  Scan scan{DepthImage(200, 200), LabelImage(200, 200, kLabelTable), NormalImage(200, 200, Eigen::Vector3f::Zero())};
-  const Eigen::Vector3d normal(std::sin(tilt), 0.0, -std::cos(tilt));
-  for (int v = 0; v < 200; ++v)
-    for (int u = 0; u < 200; ++u) {
-      const Eigen::Vector3d ray = unproject(kCamera, u, v, 1.0);
-      scan.depth.at(v, u) = static_cast<float>(-std::cos(tilt) * depth / normal.dot(ray));
-      scan.normals.at(v, u) = normal.cast<float>();
-    }
-  return scan;
-}
-
-// Two planes that face the camera, the left half of the image at `near`, the right one at `far`.
-Scan step_scan(double near, double far) {
-  Scan scan = plane_scan(far);
-  for (int v = 0; v < 200; ++v)
-    for (int u = 0; u < 100; ++u) scan.depth.at(v, u) = static_cast<float>(near);
-  return scan;
-}
-
-struct Errors {
-  double mean = 0.0, sigma = 0.0;  // metres, of the readings
-  int missing = 0;                 // pixels
-};
-
-Errors errors(const DepthImage& noisy, const Scan& scan) {
-  Errors e;
-  double sum = 0.0, squares = 0.0;
-  int n = 0;
-  for (std::size_t i = 0; i < noisy.pixels.size(); ++i) {
-    if (noisy.pixels[i] == 0.0f) {
-      ++e.missing;
-      continue;
-    }
-    const double error = static_cast<double>(noisy.pixels[i]) - scan.depth.pixels[i];
-    sum += error;
-    squares += error * error;
-    ++n;
-  }
-  e.mean = sum / n;
-  e.sigma = std::sqrt(squares / n - e.mean * e.mean);
-  return e;
-}
 
 Errors plane_errors(SensorModel sensor, double scale, double depth) {
   const Scan scan = plane_scan(depth);
@@ -68,9 +19,6 @@ Errors plane_errors(SensorModel sensor, double scale, double depth) {
 // A standard deviation from n draws is known to 1 / sqrt(2 n) of itself, a mean to sigma / sqrt(n): five times that.
 constexpr double kSigmaTolerance = 5.0 / 283.0;  // sqrt(2 * 40000) = 283
 constexpr double kMeanTolerance = 5.0 / 200.0;   // sqrt(40000) = 200
-
-// Five standard deviations of a count with probability p in n.
-double count_tolerance(double p, int n) { return 5.0 * std::sqrt(n * p * (1.0 - p)); }
 
 TEST(SensorNoise, RealsenseFollowsIntelsFormula) {
   EXPECT_NEAR(realsense_sigma(0.7, 0.0), 0.00185, 0.5e-5);  // as the tuning guide's calculation gives
@@ -277,105 +225,6 @@ TEST(SensorNoise, WarpIsAnErrorOfTheDisparity) {
   // Squares are correlated over 2 pi 5^2 = 157 pixels.
   EXPECT_NEAR(squares / 0.01, 1.0, 5.0 * std::sqrt(2.0 / 5000.0));
   EXPECT_LT(bend / squares, 0.03);  // 2 (1 - exp(-1 / 100)) = 0.02: neighbours differ little
-}
-
-TEST(SensorNoise, HolesTakeTheirShareInBlobs) {
-  const Scan scan = plane_scan(1.0);
-  SensorTerms terms;
-  terms.hole_share = 0.05;
-  terms.hole_length_px = 4.0;
-  Rng rng = make_rng(17);
-  double missing = 0.0, beside = 0.0;
-  constexpr int kImages = 40;
-  for (int image = 0; image < kImages; ++image) {
-    const DepthImage noisy = apply_sensor_noise(scan, kCamera, terms, 1.0, rng);
-    for (int v = 0; v < 200; ++v)
-      for (int u = 0; u + 1 < 200; ++u) {
-        if (noisy.at(v, u) > 0.0f) {
-          EXPECT_EQ(noisy.at(v, u), scan.depth.at(v, u));  // outside of holes nothing changes
-          continue;
-        }
-        ++missing;
-        beside += noisy.at(v, u + 1) == 0.0f;
-      }
-  }
-  // As many independent pixels as blobs of 2 pi 4^2 = 100: 16,000.
-  EXPECT_NEAR(missing / (kImages * 200 * 199), 0.05, 5.0 * std::sqrt(0.05 * 0.95 / 16000.0));
-  EXPECT_GT(beside / missing, 0.8) << "a hole's pixels lie together";
-}
-
-TEST(SensorNoise, GrazingSurfacesGiveNoReading) {
-  Rng rng = make_rng(10);
-  // The camera sees 18 degrees across: of a plane tilted by 80 degrees incidences from 70.6 to 89.4.
-  const Scan scan = plane_scan(1.0, 80 * kDegree);
-  const DepthImage noisy = apply_sensor_noise(scan, kCamera, SensorModel::kRealsense, 1.0, rng);
-  for (int v = 0; v < 200; ++v)
-    for (int u = 0; u < 200; ++u) {
-      const double from_grazing = 90.0 - incidence_angle(scan, kCamera, v, u) / kDegree;
-      if (std::abs(from_grazing - 8.0) < 1e-3) continue;  // floats
-      EXPECT_EQ(noisy.at(v, u) == 0.0f, from_grazing < 8.0) << u << ", " << v;
-    }
-}
-
-TEST(SensorNoise, IncidenceDropsItsShare) {
-  SensorTerms terms;
-  terms.incidence_drop = 1.0;
-  const Scan scan = plane_scan(1.0, 60 * kDegree);
-  double expected = 0.0;
-  for (int v = 0; v < 200; ++v)
-    for (int u = 0; u < 200; ++u) expected += 1.0 - std::cos(incidence_angle(scan, kCamera, v, u));
-  Rng rng = make_rng(11);
-  const Errors e = errors(apply_sensor_noise(scan, kCamera, terms, 1.0, rng), scan);
-  EXPECT_NEAR(e.missing, expected, count_tolerance(expected / kPixels, kPixels));
-  EXPECT_NEAR(e.sigma, 0.0, 1e-6);  // what is left is exact
-}
-
-TEST(SensorNoise, EdgesAreWhereDepthSteps) {
-  const Scan scan = step_scan(0.6, 0.7);
-  EXPECT_FALSE(depth_across_edge(scan, kCamera, 50, 98));
-  EXPECT_FALSE(depth_across_edge(scan, kCamera, 50, 101));
-  EXPECT_NEAR(*depth_across_edge(scan, kCamera, 50, 99), 0.7, 1e-6);
-  EXPECT_NEAR(*depth_across_edge(scan, kCamera, 50, 100), 0.6, 1e-6);
-  EXPECT_FALSE(depth_across_edge(step_scan(0.695, 0.7), kCamera, 50, 99)) << "5 mm are below the threshold";
-  // A steep plane changes by centimetres a pixel and has no edge.
-  const Scan steep = plane_scan(2.0, 75 * kDegree);
-  EXPECT_GT(std::abs(steep.depth.at(50, 101) - steep.depth.at(50, 100)), kEdgeStep);
-  for (int u = 0; u < 200; ++u) EXPECT_FALSE(depth_across_edge(steep, kCamera, 50, u)) << u;
-  // Beside nothing there is no depth to fly to.
-  Scan hole = plane_scan(1.0);
-  hole.depth.at(50, 50) = 0.0f;
-  EXPECT_EQ(depth_across_edge(hole, kCamera, 50, 49), 0.0);
-}
-
-TEST(SensorNoise, EdgePixelsDropOrFlyInsideTheStep) {
-  const Scan scan = step_scan(0.6, 0.9);
-  SensorTerms terms;
-  terms.edge_drop = 0.2;
-  terms.edge_fly = 0.5;
-  int dropped = 0, flying = 0, pixels = 0;
-  double sum = 0.0;
-  Rng rng = make_rng(12);
-  for (int image = 0; image < 10; ++image) {
-    const DepthImage noisy = apply_sensor_noise(scan, kCamera, terms, 1.0, rng);
-    for (int v = 0; v < 200; ++v)
-      for (int u = 0; u < 200; ++u) {
-        const float z = noisy.at(v, u);
-        if (u < 99 || u > 100) {
-          ASSERT_EQ(z, scan.depth.at(v, u));
-          continue;
-        }
-        ++pixels;
-        dropped += z == 0.0f;
-        if (z == 0.0f || z == scan.depth.at(v, u)) continue;
-        ASSERT_TRUE(z >= 0.6f && z <= 0.9f) << z;
-        ++flying;
-        sum += z;
-      }
-  }
-  EXPECT_NEAR(dropped, 0.2 * pixels, count_tolerance(0.2, pixels));
-  EXPECT_NEAR(flying, 0.4 * pixels, count_tolerance(0.4, pixels));  // half of those that did not drop
-  // Uniform in the step: mean 0.75, standard deviation 0.3 / sqrt(12).
-  EXPECT_NEAR(sum / flying, 0.75, 5.0 * 0.3 / std::sqrt(12.0 * flying));
 }
 
 TEST(SensorNoise, NothingHitStaysNothing) {
