@@ -1,6 +1,7 @@
 #include "apps/pipeline.h"
 
 #include <algorithm>
+#include <stdexcept>
 
 #include "apps/stopwatch.h"
 #include "perception/known_recovery.h"
@@ -30,29 +31,55 @@ void count_pixels(const LabelImage& labels, std::vector<RecoveredObject>& object
   }
 }
 
+// The table that the views share; brings them into its world.
+std::optional<Table> find_common_table(std::vector<View>& views) {
+  if (views.size() == 1) {
+    const std::optional<Table> table = find_table(views.front().depth, views.front().camera);
+    if (table) views.front().T_world_camera = table->T_world_camera;
+    return table;
+  }
+  std::optional<std::vector<View>> on_table = on_common_table(views);
+  if (!on_table) return std::nullopt;
+  views = std::move(*on_table);
+  return table_of(views.front());
+}
+
 }  // namespace
 
 RecoveredScene recover_scene(const DepthImage& depth, const Camera& camera, const SceneRecoveryOptions& options) {
+  return recover_scene(std::vector<View>{{depth, camera, Pose::Identity(), {}}}, options);
+}
+
+RecoveredScene recover_scene(const std::vector<View>& given, const SceneRecoveryOptions& options) {
+  if (given.empty()) throw std::invalid_argument("recover_scene: no view");
+  if (options.mask && given.size() > 1) throw std::invalid_argument("recover_scene: a mask goes with a single view");
   RecoveredScene result;
   Stopwatch watch;
-  result.table = find_table(depth, camera);
+  std::vector<View> views = given;
+  result.table = find_common_table(views);
   if (!result.table) {
     result.timing_ms["segment"] = watch.lap_ms();
     return result;
   }
-  LabelImage labels = options.mask ? segment_with_mask(depth, camera, *result.table, *options.mask)
-                                   : segment(depth, camera, *result.table);
+  if (options.mask) {
+    views.front().labels = segment_with_mask(views.front().depth, views.front().camera, *result.table, *options.mask);
+  } else {
+    segment_views(views);
+  }
   result.timing_ms["segment"] = watch.lap_ms();
 
+  const View& first = views.front();
   if (options.library.empty()) {
-    result.objects = recover_unknown(depth, camera, *result.table, labels);
-    result.labels = relabelled(labels, result.objects);
+    result.objects = recover_unknown(views);
   } else {
     KnownRecoveryOptions known;
     known.threads = options.threads;
-    result.objects = recover_known(depth, camera, *result.table, labels, options.library, known);
-    result.labels = label_recovered(depth, camera, *result.table, labels, result.objects);
+    result.objects = recover_known(views, options.library, known);
   }
+  // A label of one view may hold several objects if the other views part them.
+  const bool by_shape = !options.library.empty() || views.size() > 1;
+  result.labels = by_shape ? label_recovered(first.depth, first.camera, *result.table, first.labels, result.objects)
+                           : relabelled(first.labels, result.objects);
   count_pixels(result.labels, result.objects);
   const PlausibleScene plausible = make_plausible(to_scene(result.objects), options.physics);
   result.scene = plausible.scene;
@@ -66,6 +93,7 @@ RecoveredScene recover_scene(const DepthImage& depth, const Camera& camera, cons
     result.objects[i].object = result.scene.objects[i];
     result.objects[i].T_world_object = result.scene.T_world_object[i];
   }
+  result.views = std::move(views);
   result.timing_ms["recover"] = watch.lap_ms();
   return result;
 }

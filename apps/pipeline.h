@@ -8,6 +8,7 @@
 
 #include "perception/recovery.h"
 #include "perception/segmentation.h"
+#include "perception/views.h"
 #include "stability/physics.h"
 
 namespace dofusion {
@@ -21,6 +22,7 @@ struct SceneRecoveryOptions {
 
 struct RecoveredScene {
   std::optional<Table> table;              // none: no table was found, and nothing else is set
+  std::vector<View> views;                 // as given, on the table: its world is theirs
   LabelImage labels;                       // 0 nothing, 1 table, 2 + i objects[i]
   std::vector<RecoveredObject> objects;    // at the poses of `scene`
   Scene scene;                             // physically plausible: everything rests
@@ -32,5 +34,10 @@ struct RecoveredScene {
 
 // Table, segmentation, recovery of every object, and the least motion that makes the scene stand.
 RecoveredScene recover_scene(const DepthImage& depth, const Camera& camera, const SceneRecoveryOptions& options);
+
+// The same from several views, whose T_world_camera are in any frame that they share (perception/views.h). The table's
+// camera, the labels and the pixels are the first view's. Throws std::invalid_argument if there is no view, or a mask
+// but several views.
+RecoveredScene recover_scene(const std::vector<View>& views, const SceneRecoveryOptions& options);
 
 }  // namespace dofusion

@@ -4,72 +4,23 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "apps/assets.h"
 #include "apps/place_report.h"
 #include "apps/program.h"
+#include "apps/ranking.h"
 #include "apps/stopwatch.h"
-#include "perception/cloud_io.h"
 #include "perception/depth_io.h"
 #include "perception/mesh_sdf.h"
-#include "stability/convex_parts.h"
 #include "stability/files.h"
 #include "stability/mesh_io.h"
 #include "stability/mjcf.h"
-#include "stability/shapes.h"
 
 namespace dofusion {
 namespace fs = std::filesystem;
 namespace {
-
-constexpr std::size_t kMostTriangles = 100000;        // of a mesh: beyond, finding its convex parts takes minutes
-
-// The solid of a mesh file; `unit_option` is the argument that says its unit.
-ObjectAndOffset load_solid(const std::string& file, double unit, const std::string& unit_option) {
-  ObjectAndOffset solid;
-  try {
-    const MendedMesh mended = read_mended_mesh(file, unit);
-    if (mended.holes > 0) std::fprintf(stderr, "%s\n", mending_note(file, mended).c_str());
-    const TriangleMesh& mesh = mended.mesh;
-    if (mesh.triangles.size() > kMostTriangles) {
-      throw InputError(file + ": a mesh of " + std::to_string(mesh.triangles.size()) + " triangles; simplify it to " +
-                       std::to_string(kMostTriangles) + " or fewer");
-    }
-    solid = make_object(fs::path(file).stem().string(), mesh);
-    solid.object = with_convex_parts(solid.object);
-  } catch (const std::invalid_argument& e) {
-    throw InputError(file + ": " + e.what());
-  }
-  check_object_size(file, solid.object->diameter, unit, unit_option);
-  return solid;
-}
-
-std::vector<ObjectPtr> load_library(const std::string& directory, double unit) {
-  if (!fs::is_directory(directory)) throw InputError(directory + ": --objects needs a folder of mesh files");
-  std::vector<fs::path> files;
-  std::error_code error;
-  for (fs::directory_iterator entry(directory, error), end; !error && entry != end; entry.increment(error)) {
-    std::string extension = entry->path().extension().string();
-    std::transform(extension.begin(), extension.end(), extension.begin(), ::tolower);
-    if (extension == ".obj" || extension == ".stl" || extension == ".ply") files.push_back(entry->path());
-  }
-  if (error) throw InputError(directory + ": cannot be listed (" + error.message() + ")");
-  std::sort(files.begin(), files.end());
-  if (files.empty()) throw InputError(directory + ": no .obj, .stl or .ply file in it");
-  std::vector<ObjectPtr> library;
-  for (const fs::path& file : files) {
-    library.push_back(load_solid(file.string(), unit, "--objects-unit").object);
-  }
-  return library;
-}
-
-void check_readings(const DepthImage& depth, const std::string& file) {
-  const auto valid = [](float z) { return std::isfinite(z) && z > 0.0F; };
-  if (std::none_of(depth.pixels.begin(), depth.pixels.end(), valid)) {
-    throw InputError(file + ": no pixel has a depth reading; is it the right image?");
-  }
-}
 
 nlohmann::json matrix(const Pose& pose) {
   nlohmann::json rows = nlohmann::json::array();
@@ -83,6 +34,21 @@ nlohmann::json number_or_null(double value) { return std::isfinite(value) ? nloh
 
 std::string object_file(std::size_t index) { return "objects/" + std::to_string(index) + ".obj"; }
 
+// How many placements do not meet which wish.
+std::map<std::string, int> failures(const std::vector<Placement>& placements) {
+  std::map<std::string, int> counts;
+  for (const Placement& placement : placements) {
+    for (const std::string& wish : placement.unmet) ++counts[wish];
+  }
+  return counts;
+}
+
+nlohmann::json wishes_json(const Wishes& wishes, const std::vector<Placement>& placements) {
+  const auto met = std::count_if(placements.begin(), placements.end(),
+                                 [](const Placement& p) { return p.stable && p.unmet.empty(); });
+  return {{"asked", to_string(wishes)}, {"stable_and_met", met}, {"unmet", failures(placements)}};
+}
+
 std::string scene_xml(const PlaceInputs& inputs, const PlaceResult& result, const PhysicsOptions& physics) {
   Scene scene = result.recovered.scene;
   MjcfOptions mjcf;
@@ -94,48 +60,6 @@ std::string scene_xml(const PlaceInputs& inputs, const PlaceResult& result, cons
   }
   return mjcf_text(scene.objects, scene.T_world_object, physics, mjcf);
 }
-
-}  // namespace
-
-ObjectAndOffset load_query(const std::string& name_or_file, double unit) {
-  const auto& names = block_names();
-  if (std::find(names.begin(), names.end(), name_or_file) != names.end()) return {make_block(name_or_file), {0, 0, 0}};
-  std::error_code error;
-  if (!fs::exists(name_or_file, error)) {
-    std::string known;
-    for (const std::string& name : names) known += (known.empty() ? "" : ", ") + name;
-    throw InputError("--query " + name_or_file + ": neither a mesh file nor a block (" + known + ")");
-  }
-  return load_solid(name_or_file, unit, "--query-unit");
-}
-
-void check_inputs_survive(const PlaceArguments& arguments, const std::string& directory) {
-  for (const std::string& input : {arguments.depth, arguments.cloud, arguments.camera, arguments.mask, arguments.query,
-                                   arguments.objects, arguments.model}) {
-    for (const char* output : {"placements.json", "segmentation.png", "query.obj", "scene.xml", "report.html", "objects"}) {
-      std::error_code error;
-      if (input.empty() || !fs::equivalent(input, fs::path(directory) / output, error)) continue;
-      throw InputError(input + ": --out " + directory + " would write over it; choose another folder");
-    }
-  }
-}
-
-PlaceInputs load_inputs(const PlaceArguments& arguments) {
-  PlaceInputs inputs;
-  inputs.camera = read_camera(arguments.camera);
-  const std::string& image = arguments.cloud.empty() ? arguments.depth : arguments.cloud;
-  inputs.depth = arguments.cloud.empty() ? read_depth(arguments.depth, inputs.camera)
-                                         : read_cloud_as_depth(arguments.cloud, inputs.camera);
-  check_readings(inputs.depth, image);
-  if (!arguments.mask.empty()) inputs.mask = read_labels(arguments.mask, inputs.camera);
-  const ObjectAndOffset query = load_query(arguments.query, arguments.query_unit);
-  inputs.query = query.object;
-  inputs.query_origin = query.origin;
-  if (!arguments.objects.empty()) inputs.library = load_library(arguments.objects, arguments.objects_unit);
-  return inputs;
-}
-
-namespace {
 
 // A few at a time, between which a signal is seen.
 std::vector<Pose> sample_interruptibly(const PlacementModel& model, const std::vector<PlacementProblem>& problems,
@@ -151,7 +75,40 @@ std::vector<Pose> sample_interruptibly(const PlacementModel& model, const std::v
   return poses;
 }
 
+constexpr int kRounds = 3;     // of candidates, while few of them meet what is wished
+constexpr int kEnough = 4;     // that do
+
+bool too_few(const Wishes& wishes, const std::vector<Placement>& placements) {
+  if (!wishes.any()) return false;
+  return std::count_if(placements.begin(), placements.end(),
+                       [](const Placement& p) { return p.stable && p.unmet.empty(); }) < kEnough;
+}
+
+// The sampler's options, steered towards what is wished.
+PlacementOptions with_wishes(const PlaceArguments& arguments, const WishScene& scene,
+                             const std::optional<Pose>& T_world_estimate) {
+  PlacementOptions options = arguments.placement;
+  options.guides = guides(arguments.wishes, scene);
+  options.start = T_world_estimate;
+  if (T_world_estimate) options.start_sigma = arguments.refine_noise;
+  options.centre = wished_centre(arguments.wishes, scene);
+  if (arguments.wishes.on_object) options.anchor = static_cast<std::size_t>(*arguments.wishes.on_object);
+  if (T_world_estimate && !options.centre) options.centre = T_world_estimate->translation().head<2>();
+  if (!options.anchor && options.centre && !scene.scene.objects.empty()) {
+    const std::vector<Pose>& poses = scene.scene.T_world_object;
+    const auto distance = [&](const Pose& pose) { return (pose.translation().head<2>() - *options.centre).norm(); };
+    const auto nearest = std::min_element(poses.begin(), poses.end(),
+                                          [&](const Pose& a, const Pose& b) { return distance(a) < distance(b); });
+    options.anchor = static_cast<std::size_t>(nearest - poses.begin());
+  }
+  return options;
+}
+
 }  // namespace
+
+bool found_placement(const PlaceResult& result) {
+  return !result.placements.empty() && result.placements.front().stable && result.placements.front().unmet.empty();
+}
 
 PlaceResult run_placement(const PlaceInputs& inputs, const PlaceArguments& arguments) {
   PlaceResult result;
@@ -161,7 +118,9 @@ PlaceResult run_placement(const PlaceInputs& inputs, const PlaceArguments& argum
   recovery.physics = arguments.placement.physics;
   recovery.threads = arguments.placement.threads;
   const PlacementModel model = PlacementModel::load(arguments.model.empty() ? default_model_path() : arguments.model);
-  result.recovered = recover_scene(inputs.depth, inputs.camera, recovery);
+  std::vector<View> views = {{inputs.depth, inputs.camera, inputs.T_given_camera.value_or(Pose::Identity()), {}}};
+  views.insert(views.end(), inputs.more_views.begin(), inputs.more_views.end());
+  result.recovered = recover_scene(views, recovery);
   const auto recovered_ms = [&](const char* step) {
     const auto found = result.recovered.timing_ms.find(step);
     return found == result.recovered.timing_ms.end() ? 0.0 : found->second;
@@ -172,19 +131,43 @@ PlaceResult run_placement(const PlaceInputs& inputs, const PlaceArguments& argum
     return result;
   }
 
+  if (inputs.estimate) {
+    const bool world = inputs.estimate->name == "T_world_query";
+    result.T_world_estimate =
+        world ? inputs.estimate->pose : result.recovered.table->T_world_camera * inputs.estimate->pose;
+    const auto itself = seen_as(result.recovered.scene, *inputs.query, *result.T_world_estimate);
+    if (itself) remove_object(result.recovered, *itself);
+  }
+  check_wishes(arguments.wishes, result.recovered.objects.size());  // only now is it known what there is
   Stopwatch watch;
   const Scene scene = with_distance_fields(result.recovered.scene, {}, arguments.placement.threads);
   const ObjectPtr query = with_distance_field(inputs.query, {}, arguments.placement.threads);
   result.timing_ms.emplace_back("sdf", watch.lap_ms());
-  SamplerOptions sampler;
-  sampler.steps = arguments.placement.steps;
-  sampler.threads = arguments.placement.threads;
-  const std::vector<Pose> candidates =
-      sample_interruptibly(model, placement_problems(scene, query, arguments.placement), sampler);
-  result.timing_ms.emplace_back("sample", watch.lap_ms());
+  const WishScene wished{scene, query, inputs.camera, result.recovered.table->T_world_camera};
+  const PlacementOptions placing = with_wishes(arguments, wished, result.T_world_estimate);
+  double sample_ms = 0.0, settle_ms = 0.0;
+  for (int round = 0; round < kRounds && (round == 0 || too_few(arguments.wishes, result.placements)); ++round) {
+    PlacementOptions now = placing;
+    now.seed = round == 0 ? placing.seed : make_rng(placing.seed, 0x726f756e6400u + static_cast<unsigned>(round))();
+    const std::vector<Pose> candidates =
+        sample_interruptibly(model, placement_problems(scene, query, now), sampler_options(now));
+    sample_ms += watch.lap_ms();
+    if (interrupted()) throw Interrupted("interrupted");
+    for (Placement& placement : check_placements(scene, query, candidates, now)) {
+      placement.unmet = unmet(arguments.wishes, wished, placement);
+      result.placements.push_back(std::move(placement));
+    }
+    settle_ms += watch.lap_ms();
+  }
+  result.timing_ms.emplace_back("sample", sample_ms);
   if (interrupted()) throw Interrupted("interrupted");
-  result.placements = check_placements(scene, query, candidates, arguments.placement);
-  result.timing_ms.emplace_back("settle", watch.lap_ms());
+  const SceneSampler scenes(result.recovered, arguments.placement.physics, {}, arguments.placement.seed);
+  RankingOptions ranking;
+  ranking.seed = arguments.placement.seed;
+  ranking.threads = arguments.placement.threads;
+  rank_by_probability(scenes, inputs.query, ranking, result.placements);
+  if (result.T_world_estimate) rank_by_agreement(*inputs.query, *result.T_world_estimate, result.placements);
+  result.timing_ms.emplace_back("settle", settle_ms + watch.lap_ms());
   return result;
 }
 
@@ -194,9 +177,15 @@ std::string placements_json(const PlaceInputs& inputs, const PlaceArguments& arg
   json["version"] = 1;
   json["seed"] = arguments.placement.seed;
   const bool table = result.recovered.table.has_value();
-  json["status"] = !table ? "no_table" : result.recovered.objects.empty() ? "no_object" : "ok";
+  json["status"] = !table                                                     ? "no_table"
+                   : arguments.wishes.any() && !found_placement(result)      ? "unreachable"
+                   : result.recovered.objects.empty()                        ? "no_object"
+                                                                             : "ok";
   const Pose T_world_camera = table ? result.recovered.table->T_world_camera : Pose::Identity();
   json["T_world_camera"] = table ? matrix(T_world_camera) : nlohmann::json();
+  if (inputs.T_given_camera) {
+    json["T_given_world"] = table ? matrix(*inputs.T_given_camera * T_world_camera.inverse()) : nlohmann::json();
+  }
   json["objects"] = nlohmann::json::array();
   for (std::size_t i = 0; i < result.recovered.objects.size(); ++i) {
     const RecoveredObject& object = result.recovered.objects[i];
@@ -210,10 +199,12 @@ std::string placements_json(const PlaceInputs& inputs, const PlaceArguments& arg
   json["recovered_scene_moved"] = {{"status", to_string(result.recovered.settled)},
                                    {"translational_displacement_pct", number_or_null(result.recovered.moved_pct)},
                                    {"rotational_displacement_deg", number_or_null(result.recovered.moved_deg)}};
+  if (result.T_world_estimate) json["T_world_estimate"] = matrix(*result.T_world_estimate);
   const Eigen::Vector3d& origin = inputs.query_origin;
   json["query"] = {{"name", inputs.query->name},
                    {"mesh", "query.obj"},
                    {"origin_in_file", {origin.x(), origin.y(), origin.z()}}};
+  if (arguments.wishes.any()) json["wishes"] = wishes_json(arguments.wishes, result.placements);
   json["placements"] = nlohmann::json::array();
   for (std::size_t i = 0; i < result.placements.size(); ++i) {
     const Placement& placement = result.placements[i];
@@ -223,10 +214,13 @@ std::string placements_json(const PlaceInputs& inputs, const PlaceArguments& arg
          {"T_camera_query", matrix(T_world_camera.inverse() * placement.T_world_query)},
          {"stable", placement.stable},
          {"status", to_string(placement.status)},
+         {"stable_probability",
+          placement.stable_probability ? nlohmann::json(*placement.stable_probability) : nlohmann::json()},
          {"robustness", placement.robustness ? nlohmann::json(*placement.robustness) : nlohmann::json()},
          {"translational_displacement_pct", number_or_null(placement.displacement.translation_pct)},
          {"rotational_displacement_deg", number_or_null(placement.displacement.rotation_deg)},
          {"penetration_m", placement.penetration}});
+    if (arguments.wishes.any()) json["placements"].back()["unmet"] = placement.unmet;
   }
   for (const auto& [step, ms] : result.timing_ms) json["timing_ms"][step] = std::round(ms * 10.0) / 10.0;
   // A file's name need not be UTF-8; JSON must.

@@ -1,50 +1,26 @@
-// What dofusion-place is asked to do, its inputs as loaded, and its outputs as written.
+// dofusion-place's steps, from its inputs as loaded to its outputs as written.
 #pragma once
 
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "apps/pipeline.h"
+#include "apps/place_inputs.h"
 #include "apps/placement.h"
-#include "perception/camera.h"
-#include "perception/image.h"
 
 namespace dofusion {
-
-struct PlaceArguments {
-  std::string depth, cloud, camera, mask;  // files; depth or cloud
-  std::string query = "cube";              // a block's name or a mesh file
-  double query_unit = 1.0;                 // metres in a unit of the query's mesh file
-  std::string objects;                     // folder of meshes; empty: nothing is known of the objects
-  double objects_unit = 1.0;               // metres in a unit of those meshes
-  std::string model;                       // empty: the shipped one
-  PlacementOptions placement;
-};
-
-struct PlaceInputs {
-  Camera camera;
-  DepthImage depth;
-  std::optional<LabelImage> mask;
-  std::vector<ObjectPtr> library;
-  ObjectPtr query;
-  Eigen::Vector3d query_origin = Eigen::Vector3d::Zero();  // of the object's frame, in the mesh file's frame, metres
-};
-
-// Reads and checks everything; throws InputError naming the file or the argument and what is wrong.
-PlaceInputs load_inputs(const PlaceArguments& arguments);
-
-// Throws InputError if the outputs, written into `directory`, would replace one of the inputs.
-void check_inputs_survive(const PlaceArguments& arguments, const std::string& directory);
-
-// A block by name, or the solid of a mesh file. Throws InputError.
-ObjectAndOffset load_query(const std::string& name_or_file, double unit);
 
 struct PlaceResult {
   RecoveredScene recovered;
   std::vector<Placement> placements;              // best first
+  std::optional<Pose> T_world_estimate;           // that was refined; the object seen there is left out of the scene
   std::vector<std::pair<std::string, double>> timing_ms;  // in the order of the steps
 };
+
+// Whether a placement is stable and meets all wishes, by the first: they are sorted so.
+bool found_placement(const PlaceResult& result);
 
 // Runs the steps: recover the scene, sample, settle. Without a table there are no placements.
 PlaceResult run_placement(const PlaceInputs& inputs, const PlaceArguments& arguments);

@@ -154,8 +154,7 @@ std::string report_html(const PlaceInputs& inputs, const PlaceArguments& argumen
   std::string html = html_begin("Placements of the " + inputs.query->name);
   html += "<h1>Where can the " + html_escaped(inputs.query->name) + " go?</h1>\n<p class=\"lead\">" +
           html_escaped(summary_line(inputs, result)) + ".</p>\n";
-  const std::string source = arguments.cloud.empty() ? arguments.depth : arguments.cloud;
-  html += "<p class=\"soft\">" + html_escaped(source) + " · objects " +
+  html += "<p class=\"soft\">" + html_escaped(inputs.source) + " · objects " +
           (arguments.objects.empty() ? "unknown" : "among the meshes of " + html_escaped(arguments.objects)) + " · seed " +
           std::to_string(arguments.placement.seed) + "</p>\n";
 

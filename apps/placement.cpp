@@ -5,7 +5,6 @@
 #include <memory>
 #include <numeric>
 
-#include "apps/program.h"
 #include "stability/parallel_for.h"
 
 namespace dofusion {
@@ -26,6 +25,10 @@ class Checker {
     placement.status = settled.status;
     placement.penetration = settled.initial_penetration;
     placement.settled = settled.T_world_object;
+    const int query = static_cast<int>(objects_.size()) - 1;
+    for (const auto& [a, b] : settled.touching) {
+      if (b == query) placement.touches.push_back(a);  // pairs are in order, and the query is last
+    }
     if (settled.status == SettleStatus::kDiverged) {
       const double inf = std::numeric_limits<double>::infinity();
       placement.displacement = {inf, inf};
@@ -100,12 +103,22 @@ std::vector<PlacementProblem> placement_problems(const Scene& scene, const Objec
     problem.query = query;
     problem.seed = make_rng(options.seed, static_cast<std::uint64_t>(i))();
     const bool whole = n <= static_cast<std::size_t>(options.context);
-    problem.context = whole ? scene
-                            : local_scene(scene, static_cast<std::size_t>(i) % n, static_cast<std::size_t>(options.context));
-    problem.centre = default_centre(problem.context);
+    const std::size_t anchor = options.anchor.value_or(static_cast<std::size_t>(i) % std::max<std::size_t>(n, 1));
+    problem.context = whole ? scene : local_scene(scene, anchor, static_cast<std::size_t>(options.context));
+    problem.centre = options.centre.value_or(default_centre(problem.context));
+    problem.start = options.start;
+    problem.guides = options.guides;
     problems.push_back(std::move(problem));
   }
   return problems;
+}
+
+SamplerOptions sampler_options(const PlacementOptions& options) {
+  SamplerOptions sampler;
+  sampler.steps = options.steps;
+  sampler.threads = options.threads;
+  sampler.start_sigma = options.start_sigma;
+  return sampler;
 }
 
 std::vector<Placement> check_placements(const Scene& scene, const ObjectPtr& query, const std::vector<Pose>& candidates,
@@ -145,10 +158,8 @@ std::vector<Placement> check_placements(const Scene& scene, const ObjectPtr& que
 
 std::vector<Placement> place(const Scene& scene, const ObjectPtr& query, const PlacementModel& model,
                              const PlacementOptions& options) {
-  SamplerOptions sampler;
-  sampler.steps = options.steps;
-  sampler.threads = options.threads;
-  const std::vector<Pose> candidates = model.sample(placement_problems(scene, query, options), sampler);
+  const std::vector<Pose> candidates =
+      model.sample(placement_problems(scene, query, options), sampler_options(options));
   return check_placements(scene, query, candidates, options);
 }
 

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "diffusion/sampler.h"
@@ -17,6 +18,11 @@ struct PlacementOptions {
   int threads = 1;
   int steps = 50;                 // of the sampler
   int context = 2;                // objects that the model looks at in one sample; more are taken in turn
+  std::optional<std::size_t> anchor;  // the object that every sample looks at; none: each in turn
+  std::optional<Eigen::Vector2d> centre;  // world x, y where the search begins; none: amid what the sample looks at
+  std::optional<Pose> start;          // T_world_query to begin at, with noise of `start_sigma`, instead of anywhere
+  double start_sigma = 0.0;           // in the model's lengths and radians; 0: the model's largest
+  std::vector<PoseCostPtr> guides;    // wishes that steer the sampler
   bool polish = true;             // take the pose at which a stable sample came to rest, if that moves less
   int trials = 6;                 // of each of the best candidates, with its pose disturbed by what follows
   int tried = 12;                 // candidates that are tried so
@@ -33,7 +39,10 @@ struct Placement {
   Displacement displacement;           // the largest over all objects; infinite if the simulation diverged
   double penetration = 0.0;            // metres, deepest overlap before settling
   std::optional<double> robustness;    // share of the disturbed trials that were stable; none if not tried
+  std::optional<double> stable_probability;  // over what the scene may really be (ranking.h); none if not tried
   std::vector<Pose> settled;           // context first, the query last
+  std::vector<int> touches;            // context objects that the settled query touches, -1 the table
+  std::vector<std::string> unmet;      // wishes that it does not meet (wishes.h)
 };
 
 // Candidates from the model, settled with the whole scene, best first: stable ones by robustness, then by how little
@@ -45,6 +54,9 @@ std::vector<Placement> place(const Scene& scene, const ObjectPtr& query, const P
 // scene if that is no more than options.context objects.
 std::vector<PlacementProblem> placement_problems(const Scene& scene, const ObjectPtr& query,
                                                  const PlacementOptions& options);
+
+// What the model's sampler is told.
+SamplerOptions sampler_options(const PlacementOptions& options);
 
 // Settles each candidate pose with the whole scene, polishes, tries and ranks.
 std::vector<Placement> check_placements(const Scene& scene, const ObjectPtr& query, const std::vector<Pose>& candidates,

@@ -1,4 +1,5 @@
-# find_package(dofusion COMPONENTS scene dataset stability perception diffusion diffusion_torch) from an installed tree.
+# find_package(dofusion COMPONENTS scene dataset stability perception diffusion diffusion_torch pipeline placement ranking
+# assets) from an installed tree.
 include(CMakePackageConfigHelpers)
 install(EXPORT dofusion-targets NAMESPACE dofusion:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/dofusion)
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/dofusionConfig.cmake.in

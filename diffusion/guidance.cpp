@@ -37,10 +37,12 @@ Points transformed(const Points& points, const Pose& T) {
   return out;
 }
 
-class NoPenetration : public PoseCost {
+// What no_penetration and keep_clear have in common: surfaces at least `margin` apart.
+class Apart : public PoseCost {
  public:
-  NoPenetration(const Scene& context, const Object& query, double tolerance, int points, std::uint64_t seed)
-      : query_(query), query_points_(0), tolerance_(tolerance) {
+  Apart(const Scene& context, const Object& query, double margin, bool table, double tolerance, int points,
+        std::uint64_t seed)
+      : query_(query), query_points_(0), margin_(margin), table_(table), tolerance_(tolerance) {
     Rng rng = make_rng(seed, 0x67756964u);
     query_points_ = sampled(query_, points, rng);
     for (std::size_t i = 0; i < context.objects.size(); ++i) {
@@ -53,19 +55,21 @@ class NoPenetration : public PoseCost {
   void add_terms(const Pose& T_world_query, std::vector<CostTerm>& terms) const override {
     const Vector3d origin = T_world_query.translation();
     const Points world = transformed(query_points_, T_world_query);
-    for (int i = 0; i < world.n; ++i) add(-world[i].z(), Vector3d::UnitZ(), world[i] - origin, terms);
+    if (table_) {
+      for (int i = 0; i < world.n; ++i) add(-world[i].z(), Vector3d::UnitZ(), world[i] - origin, terms);
+    }
     std::vector<float> distance(static_cast<std::size_t>(world.n));
     Points direction(world.n);
     for (std::size_t k = 0; k < shapes_.size(); ++k) {
       // The query's points in the other object, which they must leave along its distance …
       const Points in_other = transformed(query_points_, poses_[k].inverse() * T_world_query);
       shapes_[k].signed_distance(world.n, in_other.columns(), distance.data(), direction.columns());
-      for (int i = 0; i < world.n; ++i) add(-distance[i], poses_[k].linear() * direction[i], world[i] - origin, terms);
+      for (int i = 0; i < world.n; ++i) add(margin_ - distance[i], poses_[k].linear() * direction[i], world[i] - origin, terms);
       // … and the other's points in the query, which must be left behind.
       const Points in_query = transformed(context_points_[k], T_world_query.inverse() * poses_[k]);
       query_.signed_distance(world.n, in_query.columns(), distance.data(), direction.columns());
       for (int i = 0; i < world.n; ++i)
-        add(-distance[i], -(T_world_query.linear() * direction[i]), T_world_query.linear() * in_query[i], terms);
+        add(margin_ - distance[i], -(T_world_query.linear() * direction[i]), T_world_query.linear() * in_query[i], terms);
     }
   }
 
@@ -81,6 +85,8 @@ class NoPenetration : public PoseCost {
 
   CloudShape query_;
   Points query_points_;
+  double margin_;
+  bool table_;
   double tolerance_;
   std::vector<CloudShape> shapes_;
   std::vector<Pose> poses_;
@@ -105,6 +111,26 @@ class WithinRegion : public PoseCost {
 
  private:
   Eigen::Vector2d low_, high_;
+  double tolerance_;
+};
+
+class WithinPlanes : public PoseCost {
+ public:
+  WithinPlanes(std::vector<Plane> planes, double tolerance) : planes_(std::move(planes)), tolerance_(tolerance) {}
+
+  void add_terms(const Pose& T_world_query, std::vector<CostTerm>& terms) const override {
+    for (const Plane& plane : planes_) {
+      const double short_of = plane.offset - plane.normal.dot(T_world_query.translation());
+      if (short_of <= 0.0) continue;
+      CostTerm term;
+      term.value = short_of / tolerance_;
+      term.gradient.head<3>() = -plane.normal / tolerance_;
+      terms.push_back(term);
+    }
+  }
+
+ private:
+  std::vector<Plane> planes_;
   double tolerance_;
 };
 
@@ -169,7 +195,23 @@ PoseCostPtr no_penetration(const Scene& context, const Object& query, double tol
                            std::uint64_t seed) {
   if (!(tolerance > 0.0) || points < 1)
     throw std::invalid_argument("no_penetration needs a positive tolerance and at least one point");
-  return std::make_shared<NoPenetration>(context, query, tolerance, points, seed);
+  return std::make_shared<Apart>(context, query, 0.0, true, tolerance, points, seed);
+}
+
+PoseCostPtr keep_clear(const Scene& context, const Object& query, double margin, double tolerance, int points,
+                       std::uint64_t seed) {
+  if (!(margin >= 0.0) || !(tolerance > 0.0) || points < 1)
+    throw std::invalid_argument("keep_clear needs a margin of at least 0, a positive tolerance and at least one point");
+  return std::make_shared<Apart>(context, query, margin, false, tolerance, points, seed);
+}
+
+PoseCostPtr within_planes(std::vector<Plane> planes, double tolerance) {
+  for (const Plane& plane : planes) {
+    if (!(std::abs(plane.normal.norm() - 1.0) < 1e-6) || !std::isfinite(plane.offset))
+      throw std::invalid_argument("within_planes needs normals of length 1 and finite offsets");
+  }
+  if (!(tolerance > 0.0)) throw std::invalid_argument("within_planes needs a positive tolerance");
+  return std::make_shared<WithinPlanes>(std::move(planes), tolerance);
 }
 
 PoseCostPtr within_region(const Eigen::Vector2d& low, const Eigen::Vector2d& high, double tolerance) {

@@ -42,6 +42,19 @@ PoseCostPtr no_penetration(const Scene& context, const Object& query, double tol
 // The query's origin within a rectangle of the table, world x and y, metres.
 PoseCostPtr within_region(const Eigen::Vector2d& low, const Eigen::Vector2d& high, double tolerance = 0.01);
 
+// normal · p >= offset, world, metres; the normal has length 1.
+struct Plane {
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
+  double offset = 0.0;
+};
+
+// The query's origin on the positive side of every plane: above a height, or within what a part of an image shows.
+PoseCostPtr within_planes(std::vector<Plane> planes, double tolerance = 0.01);
+
+// The query at least `margin` metres from the objects of `context`, as no_penetration measures it; the table is none.
+PoseCostPtr keep_clear(const Scene& context, const Object& query, double margin, double tolerance = 0.002,
+                       int points = 256, std::uint64_t seed = 0);
+
 // A direction of the query (own frame, unit) points up, to within `free` radians.
 PoseCostPtr upright(const Eigen::Vector3d& axis_query, double free = 0.0, double tolerance = 0.05);
 

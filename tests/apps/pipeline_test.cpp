@@ -1,5 +1,8 @@
 #include "apps/pipeline.h"
 
+#include <cmath>
+#include <stdexcept>
+
 #include <gtest/gtest.h>
 
 #include "stability/metrics.h"
@@ -59,6 +62,27 @@ TEST(RecoverScene, MaskJoinsWhatTheUserSaysIsOne) {
   const RecoveredScene recovered = recover_scene(image.depth, test_camera(), options);
   expect_consistent(recovered);
   EXPECT_EQ(recovered.objects.size(), 1u);
+}
+
+TEST(RecoverScene, SeveralViewsAreOneScene) {
+  std::vector<View> views;
+  for (const double azimuth : {0.1, 2.3}) {
+    const Pose T_world_camera = look_at({0.45 * std::cos(azimuth), 0.45 * std::sin(azimuth), 0.5}, {0, 0, 0});
+    const BoxImage image = render_boxes({upright_box({0.05, 0.05, 0.05}, {0, -0.07, 0.025}, 0.3),
+                                         upright_box({0.10, 0.05, 0.025}, {0, 0.07, 0.0125}, -0.2)},
+                                        test_camera(), T_world_camera, kSigma, 1);
+    views.push_back({image.depth, test_camera(), T_world_camera, {}});
+  }
+  SceneRecoveryOptions options;
+  for (const bool known : {false, true}) {
+    if (known) options.library = all_blocks();
+    const RecoveredScene recovered = recover_scene(views, options);
+    expect_consistent(recovered);
+    EXPECT_EQ(recovered.objects.size(), 2u);
+  }
+  options.mask = LabelImage(test_camera().width, test_camera().height);
+  EXPECT_THROW(recover_scene(views, options), std::invalid_argument);
+  EXPECT_THROW(recover_scene(std::vector<View>{}, {}), std::invalid_argument);
 }
 
 TEST(RecoverScene, NothingOnTheTableAndNoTable) {

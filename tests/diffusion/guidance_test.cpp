@@ -78,7 +78,25 @@ TEST(Guidance, AFallenAxisRises) {
       0.1);
 }
 
+TEST(Guidance, PlanesHoldTheOriginAbove) {
+  const PoseCostPtr above = within_planes({{Vector3d::UnitZ(), 0.1}, {Vector3d::UnitX(), -1.0}}, 0.02);
+  EXPECT_EQ(cost_of({above}, at(0, 0, 0.11)), 0.0);
+  expect_gradient_agrees(above, at(0.3, 0.1, 0.05), 1e-5, 1e-6);
+  const Pose raised = guided({above}, at(0, 0, 0.05), 0.02, 0.1);
+  EXPECT_NEAR(raised.translation().z(), 0.05 + 0.05 / 2.0, 1e-9);  // belief and tolerance are the same
+}
+
+TEST(Guidance, ClearanceIsKeptFromObjectsAndNotFromTheTable) {
+  const ObjectPtr query = make_block("cube");
+  const PoseCostPtr clear = keep_clear(one_cube(), *query, 0.03, 0.001);
+  EXPECT_EQ(cost_of({clear}, at(0.0801, 0, 0.025)), 0.0);
+  EXPECT_EQ(cost_of({keep_clear({}, *query, 0.03)}, at(0, 0, 0.025)), 0.0);
+  EXPECT_NEAR(guided({clear}, at(0.07, 0, 0.025), 0.1, 0.001).translation().x(), 0.08, 5e-4);
+}
+
 TEST(Guidance, BadWishesAreRefused) {
+  EXPECT_THROW(within_planes({{Vector3d(0, 0, 2), 0.0}}), std::invalid_argument);
+  EXPECT_THROW(keep_clear({}, *make_block("cube"), -1.0), std::invalid_argument);
   EXPECT_THROW(within_region({1, 0}, {0, 0}), std::invalid_argument);
   EXPECT_THROW(upright(Vector3d::Zero()), std::invalid_argument);
   EXPECT_THROW(no_penetration({}, *make_block("cube"), 0.0), std::invalid_argument);
