@@ -46,7 +46,7 @@ TrainingSet::TrainingSet(std::vector<SceneDataset> datasets, const ModelConfig& 
           throw InputError("scene " + std::to_string(record.index) + " of the dataset has a pose that is not finite");
         object.shape += first;
       }
-      if (!record.objects.empty()) scenes_.push_back(std::move(record.objects));
+      if (!record.objects.empty()) scenes_.push_back({std::move(record.objects), record.task == Task::kStack});
     }
   }
   if (scenes_.empty()) throw InputError("there is no scene to train on");
@@ -96,9 +96,10 @@ Pose TrainingSet::nearest_equivalent(const Shape& shape, const Eigen::Vector3d& 
 void TrainingSet::append(std::uint64_t seed, std::uint64_t example, NetworkInput& batch,
                          std::vector<float>& target_values) const {
   Rng rng = make_rng(seed, example);
-  const auto& objects = scenes_[static_cast<std::size_t>(uniform_int(rng, 0, static_cast<int>(scenes_.size()) - 1))];
-  const int count = static_cast<int>(objects.size());
-  const int query = uniform_int(rng, 0, count - 1);
+  const auto& [objects, stack] =
+      scenes_[static_cast<std::size_t>(uniform_int(rng, 0, static_cast<int>(scenes_.size()) - 1))];
+  const int last = static_cast<int>(objects.size()) - 1;
+  const int query = stack ? last : uniform_int(rng, 0, last);
   const Eigen::AngleAxisd yaw(uniform(rng, 0.0, 2.0 * M_PI), Eigen::Vector3d::UnitZ());
   const bool mirror = uniform(rng) < 0.5 && std::all_of(objects.begin(), objects.end(),
                                                         [&](const SceneObject& o) { return shapes_[o.shape].mirrors; });
@@ -140,6 +141,7 @@ void append_input(const ModelConfig& config, const std::vector<CloudShapePtr>& s
   CloudOptions options;
   options.points = points;
   options.query_points = static_cast<int>(std::lround(config.query_share * points));
+  options.sharp_share = config.sharp_share;
   options.length = length;
   options.distance_limit = config.distance_limit;
   options.origin.head<2>() = paper ? origin : pose.translation().head<2>();

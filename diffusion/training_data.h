@@ -1,5 +1,5 @@
-// Training examples drawn from datasets of stable scenes: a random object of a random scene becomes the query, the
-// scene is turned by a random yaw (and mirrored where the shapes allow it), the query's pose gets noise.
+// Training examples drawn from datasets of stable scenes: a random object of a random scene, of a stack its top, becomes
+// the query, the scene is turned by a random yaw (and mirrored where the shapes allow it), the query's pose gets noise.
 #pragma once
 
 #include <cstdint>
@@ -31,12 +31,16 @@ class TrainingSet {
     bool mirrors = false;  // its own mirror image in y
     ShapeSymmetry symmetry;  // of config.equivalent
   };
+  struct TrainingScene {
+    std::vector<SceneObject> objects;  // with indices into shapes_
+    bool stack = false;                // the last object is the only query
+  };
   CloudShapePtr cloud_shape(const Shape& shape, const Eigen::Vector3d& scale) const;
   Pose nearest_equivalent(const Shape& shape, const Eigen::Vector3d& scale, const Pose& clean, const Pose& noisy) const;
 
   ModelConfig config_;
   std::vector<Shape> shapes_;
-  std::vector<std::vector<SceneObject>> scenes_;  // with indices into shapes_
+  std::vector<TrainingScene> scenes_;
 };
 
 // One example's network input: the cloud of the scene with the query at its noisy pose, and pose features. `origin`:

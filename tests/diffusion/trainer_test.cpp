@@ -232,6 +232,25 @@ TEST_F(TrainerTest, TargetsAreTheNearestOfEqualPoses) {
   }
 }
 
+TEST_F(TrainerTest, OfAStackTheTopIsTheQueryAndElseAnyObject) {
+  ModelConfig config = small_config();
+  config.sigma_min = 1e-4;
+  config.sigma_max = 2e-4;
+  SceneDataset scenes = stacked_cubes(20, 1);
+  for (const bool stacks : {true, false}) {
+    for (SceneRecord& record : scenes.scenes) record.task = stacks ? Task::kStack : Task::kUnstructured;
+    const TrainingSet data({scenes}, config);
+    int tops = 0;
+    for (std::uint64_t i = 0; i < 100; ++i) {
+      NetworkInput input;
+      std::vector<float> target;
+      data.append(1, i, input, target);
+      tops += input.pose.back() > 1.0f;  // the height in cube edges: 0.5 or 1.5
+    }
+    stacks ? EXPECT_EQ(tops, 100) : EXPECT_NEAR(tops, 50, 25);
+  }
+}
+
 TEST_F(TrainerTest, BadDataIsRefused) {
   EXPECT_THROW(TrainingSet({}, small_config()), InputError);
   EXPECT_THROW(TrainingSet({boxes_on_table(0, 1)}, small_config()), InputError);
