@@ -1,9 +1,11 @@
-// Training examples drawn from datasets of stable scenes: a random object of a random scene, of a stack its top, becomes
-// the query, the scene is turned by a random yaw (and mirrored where the shapes allow it), the query's pose gets noise.
+// Training examples drawn from datasets of stable scenes. First the number of objects is drawn, each that there is with
+// a probability proportional to itself: crowded scenes are the hard ones, and often the fewest. Then a scene of so many;
+// a random object, of a stack its top, becomes the query, the scene is turned by a random yaw (and mirrored where the shapes allow it), the query's pose gets noise.
 #pragma once
 
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "diffusion/augmented_cloud.h"
@@ -40,7 +42,11 @@ class TrainingSet {
 
   ModelConfig config_;
   std::vector<Shape> shapes_;
-  std::vector<TrainingScene> scenes_;
+  const TrainingScene& draw_scene(Rng& rng) const;
+
+  std::vector<TrainingScene> scenes_;          // by number of objects
+  std::vector<std::pair<int, int>> by_count_;  // begin and end in scenes_ of those of one number of objects
+  int weight_ = 0;                             // sum of those numbers
 };
 
 // One example's network input: the cloud of the scene with the query at its noisy pose, and pose features. `origin`:
