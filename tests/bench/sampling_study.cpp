@@ -110,10 +110,10 @@ void samplers(const Study& study) {
   };
   const int usual = study.model.config().points;
   std::vector<Setting> settings;
-  for (const int steps : {8, 16, 25, 50, 100}) settings.push_back({steps, usual, 1.0});
-  for (const int points : {96, 192, 384})
+  for (const int steps : {8, 16, 25, 50, 100})
+    for (const double freshness : {0.0, 0.5, 0.8, 1.0}) settings.push_back({steps, usual, freshness});
+  for (const int points : {64, 96, 128, 192, 384})
     if (points != usual) settings.push_back({50, points, 1.0});
-  for (const double freshness : {0.0, 0.5, 0.8}) settings.push_back({50, usual, freshness});
   std::printf("%5s %6s %5s  %-15s %10s %12s %11s  ms a pose\n", "steps", "points", "fresh", "% stable", "median", "",
               "penetration");
   for (const Setting& setting : settings) {
