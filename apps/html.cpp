@@ -63,7 +63,8 @@ std::string html_begin(const std::string& title) {
   th, td { text-align: right; padding: 4px 10px; border-bottom: 1px solid var(--line); }
   th:first-child, td:first-child, th.text, td.text { text-align: left; }
   th { color: var(--soft); font-weight: 600; } .good { color: var(--good); } .bad { color: var(--bad); }
-  td.wide { white-space: nowrap; }
+  td.wide { white-space: nowrap; } .list { overflow-x: auto; }
+  summary { cursor: pointer; font-size: 18px; font-weight: 700; margin: 28px 0 10px; }
   @media (max-width: 720px) {
     main { padding: 20px 16px 32px; } .row, .pairs { grid-template-columns: 1fr; }
     table { font-size: 13px; } th { font-size: 12px; } th, td { padding: 4px 5px; } .wide { display: none; }

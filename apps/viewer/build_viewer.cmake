@@ -28,7 +28,8 @@ if(NOT installed STREQUAL wanted)
   if(FOR_TESTS)
     set(without)
   endif()
-  execute_process(COMMAND ${NPM} ci --ignore-scripts --no-audit --no-fund --fetch-retries=1 ${without}
+  execute_process(COMMAND ${NPM} ci --ignore-scripts --no-audit --no-fund --fetch-retries=1
+                          --fetch-retry-mintimeout=1000 ${without}
                   WORKING_DIRECTORY ${BINARY} TIMEOUT 300
                   RESULT_VARIABLE status OUTPUT_VARIABLE output ERROR_VARIABLE output)
   if(NOT status EQUAL 0)

@@ -9,7 +9,14 @@ import { GLTFLoader } from 'three/examples/jsm/loaders/GLTFLoader.js';
 const FIELD_OF_VIEW = 32;     // degrees, vertical
 const EDGE_ANGLE = 25;        // degrees between faces; from there on their edge is drawn
 const POINT_SIZE = 2;         // CSS pixels
+const MARGIN = 1.05;          // of the distance from which all is just in view
 const LEAST_POLAR = 0.02;     // radians from the vertical: straight down has no up
+
+/** Radians; exact near 0 as well, where the arc cosine of single-precision numbers is not. */
+function angleBetween(a, b) {
+  const { x, y, z, w } = a.clone().conjugate().multiply(b);
+  return 2 * Math.atan2(Math.hypot(x, y, z), Math.abs(w));
+}
 
 /** The glTF binary `bytes` on the canvas; null if the browser has no WebGL. Throws if the bytes are no glTF. */
 export async function openStage(canvas, bytes) {
@@ -31,9 +38,7 @@ class Stage {
     this.mixer = new AnimationMixer(gltf.scene);
     this.bodies = [];  // what moves; the query last
     for (const node of gltf.scene.children[0].children) this.prepare(node);
-    const box = new Box3();
-    for (const body of this.bodies) box.expandByObject(body);
-    this.ball = box.isEmpty() ? new Sphere(new Vector3(), 0.2) : box.getBoundingSphere(new Sphere());
+    this.measure();
 
     this.renderer = new WebGLRenderer({ canvas, context });
     this.renderer.shadowMap.enabled = true;
@@ -79,6 +84,25 @@ class Stage {
     }
   }
 
+  /** What must be in view: the corners of all bodies' boxes at the start of every motion. */
+  measure() {
+    this.corners = [];
+    const all = new Box3(), box = new Box3();
+    for (let motion = 0; motion < Math.max(this.motions.length, 1); ++motion) {
+      if (this.motions.length > 0) this.choose(motion);
+      for (const body of this.bodies) {
+        body.updateMatrixWorld(true);
+        all.union(box.setFromObject(body));
+        for (const x of [box.min.x, box.max.x]) {
+          for (const y of [box.min.y, box.max.y]) {
+            for (const z of [box.min.z, box.max.z]) this.corners.push(new Vector3(x, y, z));
+          }
+        }
+      }
+    }
+    this.ball = all.isEmpty() ? new Sphere(new Vector3(), 0.2) : all.getBoundingSphere(new Sphere());
+  }
+
   /** A lamp beside where the picture was taken from, with shadows, a weak one opposite, and light from the sky. */
   light() {
     this.scene.add(new HemisphereLight(0xffffff, 0xc8c4bc, 1.5));
@@ -98,6 +122,7 @@ class Stage {
     opposite.position.y += this.ball.radius;
     opposite.target = lamp.target;
     this.scene.add(lamp, opposite, lamp.target);
+    this.renderer.shadowMap.needsUpdate = true;
   }
 
   resize() {
@@ -116,12 +141,21 @@ class Stage {
     const away = this.depthCamera.getWorldPosition(new Vector3()).sub(this.ball.center);
     if (where === 'above') away.setLength(1).setY(0).normalize().multiplyScalar(LEAST_POLAR).setY(1);
     if (where === 'side') away.setY(0.12 * Math.hypot(away.x, away.z));
-    const half = 0.5 * FIELD_OF_VIEW * Math.PI / 180;
-    const narrowest = Math.min(half, Math.atan(Math.tan(half) * this.camera.aspect));
+    away.normalize();
     this.controls.target.copy(this.ball.center);
-    this.camera.position.copy(this.ball.center).addScaledVector(away.normalize(), 1.02 * this.ball.radius / Math.sin(narrowest));
+    this.camera.position.copy(this.ball.center).addScaledVector(away, MARGIN * this.distanceThatShowsAll(away));
     this.controls.update();
     this.draw();
+  }
+
+  /** From the ball's centre towards `away`, a unit vector, in metres. */
+  distanceThatShowsAll(away) {
+    const right = new Vector3(0, 1, 0).cross(away).normalize(), up = away.clone().cross(right);
+    const tall = Math.tan(0.5 * FIELD_OF_VIEW * Math.PI / 180), wide = tall * this.camera.aspect;
+    return this.corners.reduce((distance, corner) => {
+      const p = corner.clone().sub(this.ball.center);
+      return Math.max(distance, p.dot(away) + Math.max(Math.abs(p.dot(right)) / wide, Math.abs(p.dot(up)) / tall));
+    }, this.ball.radius);
   }
 
   showPoints(visible) {
@@ -143,7 +177,7 @@ class Stage {
   setTime(seconds) {
     this.action.time = seconds;
     this.mixer.update(0);
-    this.renderer.shadowMap.needsUpdate = true;
+    if (this.renderer) this.renderer.shadowMap.needsUpdate = true;
     this.draw();
   }
 
@@ -152,7 +186,7 @@ class Stage {
     let shift = 0, turn = 0;
     this.bodies.forEach((body, i) => {
       shift = Math.max(shift, body.position.distanceTo(this.start[i].position));
-      turn = Math.max(turn, body.quaternion.angleTo(this.start[i].turn));
+      turn = Math.max(turn, angleBetween(body.quaternion, this.start[i].turn));
     });
     return { shift, turn };
   }
