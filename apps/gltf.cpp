@@ -2,8 +2,9 @@
 
 #include <cmath>
 #include <cstring>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
+
+#include <nlohmann/json.hpp>
 
 namespace dofusion {
 namespace {
@@ -54,9 +55,9 @@ class Writer {
     std::vector<double> colour;
     for (const std::uint8_t c : material.colour) colour.push_back(rounded(linear_of(c)));
     colour.push_back(1.0);
-    ordered_json json = {{"name", material.name},
-                         {"pbrMetallicRoughness",
-                          {{"baseColorFactor", colour}, {"metallicFactor", 0.0}, {"roughnessFactor", 0.9}}}};
+    ordered_json json = {
+        {"name", material.name},
+        {"pbrMetallicRoughness", {{"baseColorFactor", colour}, {"metallicFactor", 0.0}, {"roughnessFactor", 0.9}}}};
     if (!material.lit) {
       json["extensions"]["KHR_materials_unlit"] = ordered_json::object();
       unlit_ = true;
@@ -76,7 +77,7 @@ class Writer {
 
   void add(const GltfCamera& camera) {
     cameras_.push_back({{"type", "perspective"},
-                                {"perspective", {{"aspectRatio", camera.aspect}, {"yfov", camera.fovy}, {"znear", 0.01}}}});
+                        {"perspective", {{"aspectRatio", camera.aspect}, {"yfov", camera.fovy}, {"znear", 0.01}}}});
     ordered_json json = {{"name", camera.name}, {"camera", 0}};
     Pose T_world_gltf = camera.T_world_camera;  // glTF's cameras look along −z with y up
     T_world_gltf.linear().col(1) *= -1.0;
@@ -134,12 +135,14 @@ class Writer {
   ordered_json primitives(const GltfMesh& mesh) {
     ordered_json attributes = {{"POSITION", positions(mesh.vertices)}};
     if (!mesh.colours.empty()) {
-      if (mesh.colours.size() != mesh.vertices.size()) throw std::invalid_argument("glTF: one colour per vertex is needed");
+      if (mesh.colours.size() != mesh.vertices.size())
+        throw std::invalid_argument("glTF: one colour per vertex is needed");
       attributes["COLOR_0"] = colours(mesh.colours);
     }
     ordered_json list = ordered_json::array();
     const auto material = [&](std::size_t index) {
-      if (index >= scene_.materials.size()) throw std::invalid_argument("glTF: there is no material " + std::to_string(index));
+      if (index >= scene_.materials.size())
+        throw std::invalid_argument("glTF: there is no material " + std::to_string(index));
       return index;
     };
     if (mesh.faces.empty()) {
@@ -203,8 +206,7 @@ class Writer {
   }
 
   std::size_t accessor(const char* type, int component, std::size_t count, std::size_t buffer_view) {
-    accessors_.push_back(
-        {{"bufferView", buffer_view}, {"componentType", component}, {"count", count}, {"type", type}});
+    accessors_.push_back({{"bufferView", buffer_view}, {"componentType", component}, {"count", count}, {"type", type}});
     return accessors_.size() - 1;
   }
 
@@ -225,7 +227,7 @@ class Writer {
     json["scenes"].push_back({{"nodes", {0}}});
     if (unlit_) json["extensionsUsed"] = {"KHR_materials_unlit"};
     const std::pair<const char*, const ordered_json*> lists[] = {
-        {"nodes", &nodes_},       {"cameras", &cameras_},     {"meshes", &meshes_},     {"materials", &materials_},
+        {"nodes", &nodes_},         {"cameras", &cameras_},   {"meshes", &meshes_},        {"materials", &materials_},
         {"accessors", &accessors_}, {"bufferViews", &views_}, {"animations", &animations_}};
     for (const auto& [name, list] : lists) {
       if (!list->empty()) json[name] = *list;  // an empty list is not allowed
@@ -242,7 +244,8 @@ class Writer {
     buffer.resize((buffer.size() + 3) / 4 * 4, '\0');
     std::string file;
     const std::size_t size = 12 + 8 + text.size() + (buffer.empty() ? 0 : 8 + buffer.size());
-    for (const std::size_t word : {std::size_t{kMagic}, std::size_t{kVersion}, size, text.size(), std::size_t{kJsonChunk}}) {
+    for (const std::size_t word :
+         {std::size_t{kMagic}, std::size_t{kVersion}, size, text.size(), std::size_t{kJsonChunk}}) {
       append_word(file, static_cast<std::uint32_t>(word));
     }
     file += text;

@@ -26,10 +26,10 @@ struct GltfFaces {
 
 // Triangles without normals, which viewers shade flat; or, without faces, points.
 struct GltfMesh {
-  std::vector<Eigen::Vector3f> vertices;              // (V) metres
-  std::vector<std::array<std::uint8_t, 3>> colours;   // (V) of points, sRGB; empty: the material's
-  std::vector<GltfFaces> faces;                       // one per material
-  std::size_t point_material = 0;                     // of points
+  std::vector<Eigen::Vector3f> vertices;             // (V) metres
+  std::vector<std::array<std::uint8_t, 3>> colours;  // (V) of points, sRGB; empty: the material's
+  std::vector<GltfFaces> faces;                      // one per material
+  std::size_t point_material = 0;                    // of points
 };
 
 struct GltfNode {

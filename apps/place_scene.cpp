@@ -48,7 +48,8 @@ Eigen::AlignedBox2d stage(const PlaceInputs& inputs, const PlaceResult& result) 
 }
 
 // The stage and where things go while they settle, as far as is worth showing: the table of physics has no end.
-GltfMesh table_mesh(const Eigen::AlignedBox2d& stage, const std::vector<SettlingMotion>& motions, std::size_t material) {
+GltfMesh table_mesh(const Eigen::AlignedBox2d& stage, const std::vector<SettlingMotion>& motions,
+                    std::size_t material) {
   Eigen::AlignedBox2d box = stage;
   const Eigen::AlignedBox2d most(stage.min().array() - kMostAside, stage.max().array() + kMostAside);
   for (const SettlingMotion& motion : motions) {
@@ -143,7 +144,8 @@ class Builder {
   std::vector<float> shown_shares(const RecoveredObject& object) {
     if (object.known) return std::vector<float>(object.object->mesh.triangles.size(), 1.0f);
     if (views_.empty()) {
-      views_.push_back({inputs_.depth, inputs_.camera, result_.recovered.table->T_world_camera, result_.recovered.labels});
+      views_.push_back(
+          {inputs_.depth, inputs_.camera, result_.recovered.table->T_world_camera, result_.recovered.labels});
     }
     return seen_shares(object, views_);
   }
@@ -176,13 +178,15 @@ class Builder {
 
 }  // namespace
 
-GltfScene place_scene(const PlaceInputs& inputs, const PlaceResult& result, const std::vector<SettlingMotion>& motions) {
+GltfScene place_scene(const PlaceInputs& inputs, const PlaceResult& result,
+                      const std::vector<SettlingMotion>& motions) {
   return result.recovered.table ? Builder(inputs, result).build(motions) : GltfScene{};
 }
 
 std::string scene_glb(const PlaceInputs& inputs, const PlaceResult& result, const PlacementOptions& options) {
-  return to_glb(place_scene(inputs, result, settling_motions(result.recovered.scene, inputs.query, result.placements,
-                                                             options.physics, options.threads)));
+  return to_glb(place_scene(
+      inputs, result,
+      settling_motions(result.recovered.scene, inputs.query, result.placements, options.physics, options.threads)));
 }
 
 }  // namespace dofusion

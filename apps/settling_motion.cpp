@@ -9,9 +9,8 @@ namespace dofusion {
 namespace {
 
 bool within(const std::vector<Pose>& poses, double reach) {
-  return std::all_of(poses.begin(), poses.end(), [&](const Pose& pose) {
-    return pose.matrix().allFinite() && pose.translation().norm() <= reach;
-  });
+  return std::all_of(poses.begin(), poses.end(),
+                     [&](const Pose& pose) { return pose.matrix().allFinite() && pose.translation().norm() <= reach; });
 }
 
 // The frames' times: regular ones, but the last is where the simulation ended.

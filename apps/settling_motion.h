@@ -8,8 +8,8 @@
 namespace dofusion {
 
 struct SettlingMotion {
-  std::vector<double> seconds;                     // (F) simulated, ascending, the first 0
-  std::vector<std::vector<Pose>> T_world_object;   // (F, context and the query last)
+  std::vector<double> seconds;                    // (F) simulated, ascending, the first 0
+  std::vector<std::vector<Pose>> T_world_object;  // (F, context and the query last)
 };
 
 struct MotionOptions {

@@ -5,8 +5,8 @@
 
 namespace dofusion {
 
-// JavaScript for a page that has the elements of viewer.js; it needs nothing from outside. Empty if the toolkit was built
-// without the viewer.
+// JavaScript for a page that has the elements of viewer.js; it needs nothing from outside. Empty if the toolkit was
+// built without the viewer.
 std::string_view viewer_script();
 
 }  // namespace dofusion

@@ -6,7 +6,7 @@ import { execFileSync } from 'node:child_process';
 import { accessSync, constants, mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
-import { delimiter, join } from 'node:path';
+import { delimiter, join, resolve } from 'node:path';
 
 const [program, assets, modules] = process.argv.slice(2);
 
@@ -30,7 +30,7 @@ function onPath(names) {
 const chromium = onPath(['chromium', 'chromium-browser', 'google-chrome']) ?? skip('chromium was not found');
 let playwright;
 try {
-  playwright = createRequire(join(modules, '/'))('playwright-core');
+  playwright = createRequire(join(resolve(modules), '/'))('playwright-core');
 } catch {
   skip('playwright-core is not installed (npm could not be reached when the viewer was built)');
 }
