@@ -12,6 +12,7 @@ namespace dofusion {
 namespace {
 
 constexpr std::size_t kMostPoints = 20000;  // of the readings: 0.4 MB in the page
+constexpr double kMostPixels = 640 * 480;   // that are looked at for them
 constexpr double kTableMargin = 0.12;       // metres of table around the objects
 constexpr double kMostAside = 0.6;          // metres of table beyond that for what rolls away
 constexpr double kMostHeight = 1.0;         // metres above the table; readings beyond are of something else
@@ -68,13 +69,15 @@ GltfMesh table_mesh(const Eigen::AlignedBox2d& stage, const std::vector<Settling
   return mesh;
 }
 
-// Every k-th valid reading above the stage.
+// Every k-th valid reading above the stage; of large images, those of a coarser grid of pixels.
 GltfMesh observed_mesh(const PlaceInputs& inputs, const PlaceResult& result, const Eigen::AlignedBox2d& box,
                        std::size_t material) {
   const Pose& T_world_camera = result.recovered.table->T_world_camera;
+  const double pixels = static_cast<double>(inputs.depth.width) * inputs.depth.height;
+  const int stride = static_cast<int>(std::ceil(std::sqrt(pixels / kMostPixels)));
   GltfMesh all;
-  for (int v = 0; v < inputs.depth.height; ++v) {
-    for (int u = 0; u < inputs.depth.width; ++u) {
+  for (int v = 0; v < inputs.depth.height; v += stride) {
+    for (int u = 0; u < inputs.depth.width; u += stride) {
       const double z = inputs.depth.at(v, u);
       if (!(z > 0.0) || !std::isfinite(z)) continue;
       const Eigen::Vector3d p = T_world_camera * unproject(inputs.camera, u, v, z);
