@@ -8,4 +8,4 @@ cmake --preset release >/dev/null
 cmake --build --preset release --target dofusion-place
 ./build/release/bin/dofusion-place --depth assets/scans/two_blocks/depth.png \
   --camera assets/scans/two_blocks/camera.json --objects assets/blocks --query hat --out out/demo
-echo "also there: out/demo/placements.json, out/demo/scene.xml (for MuJoCo), out/demo/segmentation.png"
+echo "also there: out/demo/placements.json, out/demo/scene.xml (for MuJoCo), out/demo/scene.glb (for any 3D viewer), out/demo/segmentation.png"

@@ -14,6 +14,7 @@ int main(int argc, char** argv) {
       "Trains the placement model on datasets of stable scenes.\n\nExamples:\n"
       "  dofusion-train --data one.h5 two.h5 --minutes 60 --out model.safetensors\n"
       "  dofusion-train --data one.h5 --minutes 60 --holdout-shape hat --out without_hat.safetensors\n"
+      "  dofusion-train --data one.h5 --task stack --minutes 20 --out stacks.safetensors\n"
       "  dofusion-train --data one.h5 --steps 20000 --rank 1 --world-size 2 --rendezvous first-host:29500 …\n\n"
       "FILE.checkpoint, FILE.csv and FILE.svg appear beside the model; after a kill the same command with --resume "
       "goes "
@@ -30,6 +31,8 @@ int main(int argc, char** argv) {
   app.add_option("--data", settings.data, "datasets of dofusion-generate; their scenes for training are used")
       ->required();
   app.add_option("--holdout-shape", settings.held_out_shape, "leave out every scene with this shape");
+  app.add_option("--task", settings.tasks, "use the scenes of these tasks alone")
+      ->check(CLI::IsMember({"single", "stack", "unstructured"}));
   app.add_option("--out", options.out, "the model, safetensors")->required();
   app.add_flag("--resume", options.resume, "go on from FILE.checkpoint");
   app.add_option("--minutes", options.minutes, "planned time; the learning rate falls to 0 by then")

@@ -105,8 +105,7 @@ std::vector<Outcome> settle_placements(const std::vector<Instance>& instances, c
   return outcomes;
 }
 
-std::vector<Pose> sample_placements(const std::vector<Instance>& instances, const PlacementModel& model,
-                                    std::uint64_t seed, const SamplerOptions& options) {
+std::vector<PlacementProblem> placement_problems(const std::vector<Instance>& instances, std::uint64_t seed) {
   std::vector<PlacementProblem> problems;
   for (std::size_t i = 0; i < instances.size(); ++i) {
     PlacementProblem problem;
@@ -116,7 +115,12 @@ std::vector<Pose> sample_placements(const std::vector<Instance>& instances, cons
     problem.centre = default_centre(problem.context);
     problems.push_back(std::move(problem));
   }
-  return model.sample(problems, options);
+  return problems;
+}
+
+std::vector<Pose> sample_placements(const std::vector<Instance>& instances, const PlacementModel& model,
+                                    std::uint64_t seed, const SamplerOptions& options) {
+  return model.sample(placement_problems(instances, seed), options);
 }
 
 std::vector<Pose> random_placements(const std::vector<Instance>& instances, std::uint64_t seed) {

@@ -47,6 +47,9 @@ std::vector<Instance> instances_of(const std::vector<SceneDataset>& datasets, in
 std::vector<Outcome> settle_placements(const std::vector<Instance>& instances, const std::vector<Pose>& T_world_query,
                                        int threads, const PhysicsOptions& physics = {});
 
+// One problem an instance, with seeds of its own; the noise is centred at the context.
+std::vector<PlacementProblem> placement_problems(const std::vector<Instance>& instances, std::uint64_t seed);
+
 std::vector<Pose> sample_placements(const std::vector<Instance>& instances, const PlacementModel& model,
                                     std::uint64_t seed, const SamplerOptions& options);
 std::vector<Pose> random_placements(const std::vector<Instance>& instances, std::uint64_t seed);

@@ -45,6 +45,8 @@ std::string html_begin(const std::string& title) {
 <head>
 <meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
+<meta http-equiv="Content-Security-Policy"
+      content="default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'">
 <title>)" + html_escaped(title) + R"(</title>
 <style>
   :root { --ink: #1c2430; --soft: #5c6675; --line: #dfe3e8; --good: #1a7f4b; --bad: #b3402a; }
@@ -61,7 +63,12 @@ std::string html_begin(const std::string& title) {
   th, td { text-align: right; padding: 4px 10px; border-bottom: 1px solid var(--line); }
   th:first-child, td:first-child, th.text, td.text { text-align: left; }
   th { color: var(--soft); font-weight: 600; } .good { color: var(--good); } .bad { color: var(--bad); }
-  @media (max-width: 720px) { .row, .pairs { grid-template-columns: 1fr; } }
+  td.wide { white-space: nowrap; } .list { overflow-x: auto; }
+  summary { cursor: pointer; font-size: 18px; font-weight: 700; margin: 28px 0 10px; }
+  @media (max-width: 720px) {
+    main { padding: 20px 16px 32px; } .row, .pairs { grid-template-columns: 1fr; }
+    table { font-size: 13px; } th { font-size: 12px; } th, td { padding: 4px 5px; } .wide { display: none; }
+  }
 </style>
 </head>
 <body>

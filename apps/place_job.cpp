@@ -9,6 +9,7 @@
 
 #include "apps/assets.h"
 #include "apps/place_report.h"
+#include "apps/place_scene.h"
 #include "apps/program.h"
 #include "apps/ranking.h"
 #include "apps/stopwatch.h"
@@ -239,13 +240,15 @@ void write_outputs(const std::string& directory, const PlaceInputs& inputs, cons
   LabelImage labels = result.recovered.labels;
   if (labels.pixels.empty()) labels = LabelImage(inputs.camera.width, inputs.camera.height, kLabelNothing);
   write_labels(labels, directory + "/segmentation.png");
+  const std::string glb = scene_glb(inputs, result, arguments.placement);
+  write_file(directory + "/scene.glb", glb);
   const ReportPictures pictures = render_pictures(inputs, result, arguments.placement.threads);
   result.timing_ms.emplace_back("report", watch.lap_ms());
   double total = 0.0;
   for (const auto& step : result.timing_ms) total += step.second;
   result.timing_ms.emplace_back("total", total);
   write_file(directory + "/placements.json", placements_json(inputs, arguments, result));
-  write_file(directory + "/report.html", report_html(inputs, arguments, result, pictures));
+  write_file(directory + "/report.html", report_html(inputs, arguments, result, pictures, glb));
 }
 
 std::string summary_line(const PlaceInputs& inputs, const PlaceResult& result) {

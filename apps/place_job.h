@@ -28,7 +28,8 @@ PlaceResult run_placement(const PlaceInputs& inputs, const PlaceArguments& argum
 // placements.json's text.
 std::string placements_json(const PlaceInputs& inputs, const PlaceArguments& arguments, const PlaceResult& result);
 
-// Writes placements.json, segmentation.png, query.obj, objects/<i>.obj, scene.xml and report.html into `directory`.
+// Writes placements.json, segmentation.png, query.obj, objects/<i>.obj, scene.xml, scene.glb and report.html into
+// `directory`.
 void write_outputs(const std::string& directory, const PlaceInputs& inputs, const PlaceArguments& arguments,
                    PlaceResult& result);
 

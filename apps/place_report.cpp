@@ -8,6 +8,7 @@
 
 #include "apps/html.h"
 #include "apps/program.h"
+#include "apps/viewer/viewer_script.h"
 #include "perception/picture.h"
 #include "stability/parallel_for.h"
 
@@ -81,7 +82,7 @@ std::string verdict(const Placement& placement) {
 
 std::string objects_table(const RecoveredScene& recovered) {
   std::string html = "<table><tr><th>#</th><th class=\"text\">object</th><th>x, y, z (mm)</th><th>size (mm)</th>"
-                     "<th>pixels</th><th>explained</th></tr>\n";
+                     "<th class=\"wide\">pixels</th><th>explained</th></tr>\n";
   for (std::size_t i = 0; i < recovered.objects.size(); ++i) {
     const RecoveredObject& object = recovered.objects[i];
     const Eigen::Vector3d at = object.T_world_object.translation() * 1000.0;
@@ -89,25 +90,52 @@ std::string objects_table(const RecoveredScene& recovered) {
     const Eigen::Vector3d size = (box.max - box.min) * 1000.0;
     html += "<tr><td>" + std::to_string(i) + "</td><td class=\"text\">" + html_escaped(object.name) + "</td><td>" +
             number(at.x(), 0) + ", " + number(at.y(), 0) + ", " + number(at.z(), 0) + "</td><td>" + number(size.x(), 0) +
-            " × " + number(size.y(), 0) + " × " + number(size.z(), 0) + "</td><td>" + std::to_string(object.pixels) +
+            " × " + number(size.y(), 0) + " × " + number(size.z(), 0) + "</td><td class=\"wide\">" + std::to_string(object.pixels) +
             "</td><td>" + number(100.0 * object.score, 0) + " %</td></tr>\n";
   }
   return html + "</table>\n";
 }
 
 std::string placements_table(const PlaceResult& result) {
-  std::string html = "<table><tr><th>rank</th><th class=\"text\">verdict</th><th>moves by (% of diameter)</th>"
+  std::string html = "<table id=\"candidates\"><tr><th>rank</th><th class=\"text\">verdict</th><th>moves by (% of diameter)</th>"
                      "<th>turns by (degrees)</th><th>overlap before (mm)</th><th>stands when disturbed</th>"
-                     "<th>x, y, z (mm)</th></tr>\n";
+                     "<th class=\"wide\">x, y, z (mm)</th></tr>\n";
   for (std::size_t i = 0; i < result.placements.size(); ++i) {
     const Placement& p = result.placements[i];
     const Eigen::Vector3d at = p.T_world_query.translation() * 1000.0;
-    html += "<tr><td>" + std::to_string(i + 1) + "</td><td class=\"text\">" + verdict(p) + "</td><td>" +
+    html += "<tr data-row><td>" + std::to_string(i + 1) + "</td><td class=\"text\">" + verdict(p) + "</td><td>" +
             number(p.displacement.translation_pct) + "</td><td>" + number(p.displacement.rotation_deg) + "</td><td>" +
             number(p.penetration * 1000.0) + "</td><td>" + (p.robustness ? number(100.0 * *p.robustness, 0) + " %" : "–") +
-            "</td><td>" + number(at.x(), 0) + ", " + number(at.y(), 0) + ", " + number(at.z(), 0) + "</td></tr>\n";
+            "</td><td class=\"wide\">" + number(at.x(), 0) + ", " + number(at.y(), 0) + ", " + number(at.z(), 0) + "</td></tr>\n";
   }
   return html + "</table>\n";
+}
+
+// What viewer.js makes an interactive view of: a place for it with a line that is true until then, the list, the still
+// pictures, the scene and the script itself.
+std::string candidates_section(const PlaceResult& result, const ReportPictures& pictures, const std::string& glb) {
+  const bool interactive = !viewer_script().empty();
+  std::string html = "<h2>The candidates</h2>\n<p class=\"soft\">Each was settled with the whole scene. Displacements are "
+                     "the largest over all objects; stable means that everything comes to rest and nothing moves more than "
+                     "10 % of its diameter or 10 degrees.</p>\n<div class=\"candidates\">\n<div id=\"viewer\"><p class=\"soft "
+                     "note\">";
+  html += interactive ? "The interactive view needs JavaScript and WebGL; without them there are the still pictures."
+                      : "This toolkit was built without the interactive view; scene.glb opens in any glTF viewer.";
+  html += "</p></div>\n<div class=\"list\">\n" + placements_table(result) + "</div>\n</div>\n" +
+          "<details id=\"stills\" open><summary>The best, as generated and as they settle</summary>\n<div class=\"pairs\">\n";
+  for (const auto& best : pictures.best) {
+    const Placement& p = result.placements[best.rank - 1];
+    html += figure(best.before, "Rank " + std::to_string(best.rank) + " as the model generates it") +
+            figure(best.after, "Rank " + std::to_string(best.rank) + " settled; placed there, things move by " +
+                                   number(p.displacement.translation_pct) + " % and " +
+                                   number(p.displacement.rotation_deg) + "°");
+  }
+  html += "</div></details>\n";
+  if (interactive) {
+    html += "<script type=\"text/plain\" id=\"scene-glb\">" + base64(glb) + "</script>\n<script>" +
+            std::string(viewer_script()) + "</script>\n";
+  }
+  return html;
 }
 
 std::string timing_line(const PlaceResult& result) {
@@ -150,7 +178,7 @@ ReportPictures render_pictures(const PlaceInputs& inputs, const PlaceResult& res
 }
 
 std::string report_html(const PlaceInputs& inputs, const PlaceArguments& arguments, const PlaceResult& result,
-                        const ReportPictures& pictures) {
+                        const ReportPictures& pictures, const std::string& glb) {
   std::string html = html_begin("Placements of the " + inputs.query->name);
   html += "<h1>Where can the " + html_escaped(inputs.query->name) + " go?</h1>\n<p class=\"lead\">" +
           html_escaped(summary_line(inputs, result)) + ".</p>\n";
@@ -170,19 +198,7 @@ std::string report_html(const PlaceInputs& inputs, const PlaceArguments& argumen
             number(result.recovered.moved_pct) + " % of their diameter and " + number(result.recovered.moved_deg) +
             " degrees (" + to_string(result.recovered.settled) + ").</p>\n";
   }
-  if (!pictures.best.empty()) {
-    html += "<h2>The best placements, as generated and as they settle</h2>\n<div class=\"pairs\">\n";
-    for (const auto& best : pictures.best) {
-      const Placement& p = result.placements[best.rank - 1];
-      html += figure(best.before, "Rank " + std::to_string(best.rank) + " as the model generates it") +
-              figure(best.after, "Rank " + std::to_string(best.rank) + " settled; placed there, things move by " +
-                                     number(p.displacement.translation_pct) + " % and " +
-                                     number(p.displacement.rotation_deg) + "°");
-    }
-    html += "</div>\n<h2>All placements</h2>\n<p class=\"soft\">Displacements are the largest over all objects. Stable means "
-            "that everything comes to rest and nothing moves more than 10 % of its diameter or 10 degrees.</p>\n" +
-            placements_table(result);
-  }
+  if (!result.placements.empty()) html += candidates_section(result, pictures, glb);
   html += "<p class=\"soft\">Time: " + timing_line(result) + ".</p>\n";
   return html + html_end();
 }

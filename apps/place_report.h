@@ -21,7 +21,8 @@ struct ReportPictures {
 // Rendered from the camera that took the depth image, by the scanner.
 ReportPictures render_pictures(const PlaceInputs& inputs, const PlaceResult& result, int threads);
 
+// The page; `glb`, the bytes of scene.glb, is what its 3D view shows if the toolkit was built with it.
 std::string report_html(const PlaceInputs& inputs, const PlaceArguments& arguments, const PlaceResult& result,
-                        const ReportPictures& pictures);
+                        const ReportPictures& pictures, const std::string& glb);
 
 }  // namespace dofusion

@@ -1,5 +1,6 @@
 #include "apps/study_config.h"
 
+#include <cstdio>
 #include <filesystem>
 #include <functional>
 #include <stdexcept>
@@ -100,6 +101,51 @@ StudyTask task_from_json(const json& entry, const std::string& source, const std
   return task;
 }
 
+// Takes what a condition consists of; what is absent stays.
+void take_condition(Fields& fields, StudyCondition& condition) {
+  fields.take_name<SensorModel>("sensor", condition.sensor, sensor_from_string);
+  fields.take<double>("distance_m", condition.distance_m, "a number between 0.1 and 10",
+                      [](const double& d) { return d >= 0.1 && d <= 10.0; });
+  fields.take<bool>("known", condition.known, "true or false");
+  fields.take<std::string>("model", condition.model, "a file's path");
+}
+
+bool is_same(const StudyCondition& a, const StudyCondition& b) {
+  return a.sensor == b.sensor && a.distance_m == b.distance_m && a.known == b.known && a.model == b.model;
+}
+
+StudyCondition condition_from_json(const json& entry, const StudyCondition& base, const std::string& source,
+                                   const std::string& name) {
+  if (!entry.is_object()) throw InputError(source + ": '" + name + "' must be an object of what differs");
+  StudyCondition condition = base;
+  Fields fields(entry, source, name + ".");
+  take_condition(fields, condition);
+  fields.finish();
+  return condition;
+}
+
+void take_series(Fields& fields, std::vector<StudyCondition>& series, const std::string& source) {
+  json list = json::array();
+  fields.take<json>("series", list, "a list of objects", [](const json& value) { return value.is_array(); });
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const std::string name = "series[" + std::to_string(i) + "]";
+    const StudyCondition condition = condition_from_json(list[i], series.front(), source, name);
+    for (const StudyCondition& other : series)
+      if (is_same(condition, other)) throw InputError(source + ": '" + name + "' is the same as a series before it");
+    series.push_back(condition);
+  }
+}
+
+nlohmann::ordered_json to_json(const StudyCondition& condition) {
+  return {{"sensor", to_string(condition.sensor)}, {"distance_m", condition.distance_m}, {"known", condition.known}};
+}
+
+std::string plain(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g", value);
+  return text;
+}
+
 }  // namespace
 
 StudyConfig study_config_from_json(const std::string& text, const std::string& source) {
@@ -113,17 +159,14 @@ StudyConfig study_config_from_json(const std::string& text, const std::string& s
 
   StudyConfig config;
   Fields fields(object, source, "");
-  fields.take_name<SensorModel>("sensor", config.sensor, sensor_from_string);
+  take_condition(fields, config.series.front());
+  take_series(fields, config.series, source);
   fields.take<std::vector<double>>("noise_scales", config.noise_scales, "a list of ascending numbers between 0 and 100",
                                    are_noise_scales);
-  fields.take<double>("distance_m", config.distance_m, "a number between 0.1 and 10",
-                      [](const double& d) { return d >= 0.1 && d <= 10.0; });
-  fields.take<bool>("known", config.known, "true or false");
   fields.take<int>("samples", config.samples, "a whole number between 1 and 10000",
                    [](const int& n) { return n >= 1 && n <= 10000; });
   fields.take<int>("steps", config.steps, "a whole number between 1 and 10000",
                    [](const int& n) { return n >= 1 && n <= 10000; });
-  fields.take<std::string>("model", config.model, "a file's path");
   json tasks;
   fields.take<json>("tasks", tasks, "a list of objects with task and objects",
                     [](const json& list) { return list.is_array() && !list.empty(); });
@@ -137,7 +180,9 @@ StudyConfig study_config_from_json(const std::string& text, const std::string& s
 
 StudyConfig read_study_config(const std::string& path) {
   StudyConfig config = study_config_from_json(read_file(path), path);
-  if (!config.model.empty()) config.model = (std::filesystem::path(path).parent_path() / config.model).string();
+  for (StudyCondition& condition : config.series)
+    if (!condition.model.empty())
+      condition.model = (std::filesystem::path(path).parent_path() / condition.model).string();
   return config;
 }
 
@@ -146,18 +191,48 @@ nlohmann::ordered_json to_json(const StudyConfig& config) {
   for (const StudyTask& task : config.tasks) {
     tasks.push_back({{"task", to_string(task.task)}, {"objects", task.objects}});
   }
-  return {{"sensor", to_string(config.sensor)},
+  nlohmann::ordered_json series = nlohmann::ordered_json::array();
+  for (const StudyCondition& condition : config.series) series.push_back(to_json(condition));
+  return {{"series", series},
           {"noise_scales", config.noise_scales},
-          {"distance_m", config.distance_m},
-          {"known", config.known},
           {"tasks", tasks},
           {"samples", config.samples},
           {"steps", config.steps}};
 }
 
-double depth_sigma_mm(const StudyConfig& config, double noise_scale) {
-  const SensorTerms terms = sensor_terms(config.sensor);
-  return terms.axial_sigma == nullptr ? 0.0 : 1000.0 * noise_scale * terms.axial_sigma(config.distance_m, 0.0);
+double depth_sigma_mm(const StudyCondition& condition, double noise_scale) {
+  const SensorTerms terms = sensor_terms(condition.sensor);
+  return terms.axial_sigma == nullptr ? 0.0 : 1000.0 * noise_scale * terms.axial_sigma(condition.distance_m, 0.0);
+}
+
+std::string series_title(const StudyConfig& config, std::size_t series) {
+  const StudyCondition &base = config.base(), &own = config.series.at(series);
+  std::vector<std::string> parts;
+  const bool first = series == 0;
+  if (first || own.known != base.known) parts.push_back(own.known ? "known objects" : "unknown objects");
+  if (first || own.sensor != base.sensor) parts.push_back(sensor_title(own.sensor));
+  if (first || own.distance_m != base.distance_m) parts.push_back("at " + plain(own.distance_m) + " m");
+  if (!first && own.model != base.model)
+    parts.push_back(own.model.empty() ? "the shipped model" : std::filesystem::path(own.model).filename().string());
+  std::string title;
+  for (const std::string& part : parts) title += (title.empty() ? "" : ", ") + part;
+  return title;
+}
+
+std::string sensor_title(SensorModel sensor) {
+  switch (sensor) {
+    case SensorModel::kNone:
+      return "an exact sensor";
+    case SensorModel::kKinect:
+      return "the first Kinect";
+    case SensorModel::kKinect2:
+      return "the Kinect v2";
+    case SensorModel::kRealsense:
+      return "the RealSense D435";
+    case SensorModel::kAzure:
+      return "the Azure Kinect";
+  }
+  return "";
 }
 
 }  // namespace dofusion

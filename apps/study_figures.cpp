@@ -15,6 +15,8 @@ constexpr const char* kBlue = "#0072B2";
 constexpr const char* kVermilion = "#D55E00";
 constexpr const char* kGreen = "#007A5A";
 constexpr const char* kPurple = "#AA4499";
+constexpr const char* kAmber = "#E69F00";
+constexpr const char* kSky = "#56B4E9";
 constexpr const char* kGrey = "#555555";
 
 constexpr double kDisplayFloor = 0.001;  // per cent or degrees; less is nothing that could be measured on a table
@@ -26,7 +28,7 @@ std::string one_decimal(double value) {
 }
 
 std::vector<PlotPart> failure_parts() {
-  static const std::vector<std::string> colours = {"#222222", "#0072B2", "#56B4E9", "#E69F00", "#D55E00"};
+  static const std::vector<std::string> colours = {"#222222", kBlue, kSky, kAmber, kVermilion};
   std::vector<PlotPart> parts;
   for (std::size_t i = 0; i < failure_titles().size(); ++i) {
     parts.push_back({failure_titles()[i], colours[i], i % 2 == 1});
@@ -34,25 +36,32 @@ std::vector<PlotPart> failure_parts() {
   return parts;
 }
 
-PlotAxis noise_axis(const StudySummary& summary, const StudyConfig& config) {
-  PlotAxis axis;
-  axis.title =
-      "noise scale of " + sensor_title(config.sensor) + "; below: depth σ at " + plain(config.distance_m) + " m";
-  for (const StudyPoint& p : summary.points) {
-    axis.ticks.push_back(
-        {p.noise_scale, plain(p.noise_scale), (p.depth_sigma_mm == 0.0 ? "0" : one_decimal(p.depth_sigma_mm)) + " mm"});
-  }
+// Limits a little beside the first and the last tick.
+void with_margins(PlotAxis& axis) {
   const double first = axis.ticks.front().at, last = axis.ticks.back().at;
   const double margin = last > first ? 0.06 * (last - first) : 0.5;
   axis.low = first - margin;
   axis.high = last + margin;
+}
+
+PlotAxis noise_axis(const StudySummary& summary, const StudyConfig& config) {
+  PlotAxis axis;
+  axis.title =
+      "noise scale of " + sensor_title(config.base().sensor) + "; below: depth σ at " + plain(config.base().distance_m) + " m";
+  for (const StudyPoint& p : summary.base()) {
+    axis.ticks.push_back(
+        {p.noise_scale, plain(p.noise_scale), (p.depth_sigma_mm == 0.0 ? "0" : one_decimal(p.depth_sigma_mm)) + " mm"});
+  }
+  with_margins(axis);
   return axis;
 }
 
-PlotCurve curve_of(const StudySummary& summary, const std::string& name, const char* colour, Marker marker,
-                   const std::function<const Estimate&(const StudyPoint&)>& estimate, double factor = 1.0) {
+using EstimateOf = std::function<const Estimate&(const StudyPoint&)>;
+
+PlotCurve curve_of(const std::vector<StudyPoint>& points, const std::string& name, const char* colour, Marker marker,
+                   const EstimateOf& estimate, double factor = 1.0) {
   PlotCurve curve{name, colour, marker, {}};
-  for (const StudyPoint& p : summary.points) {
+  for (const StudyPoint& p : points) {
     const Estimate& e = estimate(p);
     curve.points.push_back({p.noise_scale, factor * e.value, factor * e.interval.low, factor * e.interval.high});
   }
@@ -87,8 +96,8 @@ PlotPanel displacement_panel(const StudySummary& summary, const StudyConfig& con
   PlotPanel panel;
   panel.title = translation ? "Translation" : "Rotation";
   panel.x = noise_axis(summary, config);
-  panel.curves = {curve_of(summary, "in the recovered scene", kBlue, Marker::kCircle, median_of("recovered")),
-                  curve_of(summary, "in the true scene", kVermilion, Marker::kSquare, median_of("true"))};
+  panel.curves = {curve_of(summary.base(), "in the recovered scene", kBlue, Marker::kCircle, median_of("recovered")),
+                  curve_of(summary.base(), "in the true scene", kVermilion, Marker::kSquare, median_of("true"))};
   panel.references = {reference_of("true scene given to the model", kGreen, "9 4", reference(summary.ground_truth)),
                       reference_of("random placement", kGrey, "2 4", reference(summary.random))};
   panel.limits = {{10.0, translation ? "limit of stable: 10 %" : "limit of stable: 10°"}};
@@ -111,12 +120,12 @@ PlotPanel success_panel(const StudySummary& summary, const StudyConfig& config) 
   const auto share = [](const char* name) {
     return [name](const StudyPoint& p) -> const Estimate& { return p.shares.at(name); };
   };
-  const char* recovery = config.known ? "all objects recovered, shapes right" : "number of objects right";
+  const char* recovery = config.base().known ? "all objects recovered, shapes right" : "number of objects right";
   panel.curves = {
-      curve_of(summary, recovery, kPurple, Marker::kDiamond, share(config.known ? "shapes_right" : "objects_right"),
+      curve_of(summary.base(), recovery, kPurple, Marker::kDiamond, share(config.base().known ? "shapes_right" : "objects_right"),
                100.0),
-      curve_of(summary, "stands in the recovered scene", kBlue, Marker::kCircle, share("stable_recovered"), 100.0),
-      curve_of(summary, "stands in the true scene", kVermilion, Marker::kSquare, share("stable_true"), 100.0)};
+      curve_of(summary.base(), "stands in the recovered scene", kBlue, Marker::kCircle, share("stable_recovered"), 100.0),
+      curve_of(summary.base(), "stands in the true scene", kVermilion, Marker::kSquare, share("stable_true"), 100.0)};
   panel.references = {reference_of("true scene given to the model", kGreen, "9 4", summary.ground_truth.stable, 100.0),
                       reference_of("random placement", kGrey, "2 4", summary.random.stable, 100.0)};
   return panel;
@@ -129,13 +138,13 @@ PlotPanel failure_panel(const StudySummary& summary, const StudyConfig& config) 
   panel.parts = failure_parts();
   // Bars stand side by side, whatever the scales.
   panel.x.low = -0.6;
-  panel.x.high = static_cast<double>(summary.points.size()) - 0.4;
+  panel.x.high = static_cast<double>(summary.base().size()) - 0.4;
   double highest = 0.0;
-  for (std::size_t i = 0; i < summary.points.size(); ++i) {
+  for (std::size_t i = 0; i < summary.base().size(); ++i) {
     PlotBar bar{static_cast<double>(i), {}};
     double sum = 0.0;
     for (const std::string& failure : failure_names()) {
-      bar.parts.push_back(100.0 * summary.points[i].failures.at(failure));
+      bar.parts.push_back(100.0 * summary.base()[i].failures.at(failure));
       sum += bar.parts.back();
     }
     highest = std::max(highest, sum);
@@ -151,9 +160,30 @@ PlotPanel failure_panel(const StudySummary& summary, const StudyConfig& config) 
   return panel;
 }
 
+// What the series make of the true scene: the share that stands, or the median translation.
+PlotPanel series_panel(const StudySummary& summary, bool success) {
+  PlotPanel panel;
+  panel.title = success ? "Placements that stand in the true scene" : "Translation in the true scene";
+  static const std::vector<const char*> colours = {kVermilion, kBlue, kGreen, kPurple, kAmber, kSky, kGrey};
+  const EstimateOf estimate = [success](const StudyPoint& p) -> const Estimate& {
+    return success ? p.shares.at("stable_true") : p.medians.at("displacement_true_pct");
+  };
+  for (std::size_t i = 0; i < summary.series.size(); ++i) {
+    const StudySeries& series = summary.series[i];
+    panel.curves.push_back(curve_of(series.points, series.title, colours[i % colours.size()],
+                                    static_cast<Marker>(i % 3), estimate, success ? 100.0 : 1.0));
+  }
+  panel.x.title = "noise scale";
+  for (const StudyPoint& p : summary.base()) panel.x.ticks.push_back({p.noise_scale, plain(p.noise_scale), ""});
+  with_margins(panel.x);
+  panel.y = success ? share_axis("share of the trials, %")
+                    : log_axis("median displacement, % of the diameter", kDisplayFloor, top_decade(panel));
+  return panel;
+}
+
 std::string trials_per_scale(const StudySummary& summary) {
   int fewest = summary.trials, most = 0;
-  for (const StudyPoint& p : summary.points) {
+  for (const StudyPoint& p : summary.base()) {
     fewest = std::min(fewest, p.trials);
     most = std::max(most, p.trials);
   }
@@ -166,22 +196,6 @@ std::string plain(double value) {
   char buffer[32];
   std::snprintf(buffer, sizeof buffer, "%g", value);
   return buffer;
-}
-
-std::string sensor_title(SensorModel sensor) {
-  switch (sensor) {
-    case SensorModel::kNone:
-      return "an exact sensor";
-    case SensorModel::kKinect:
-      return "the first Kinect";
-    case SensorModel::kKinect2:
-      return "the Kinect v2";
-    case SensorModel::kRealsense:
-      return "the RealSense D435";
-    case SensorModel::kAzure:
-      return "the Azure Kinect";
-  }
-  return "";
 }
 
 const std::vector<std::string>& failure_titles() {
@@ -197,6 +211,12 @@ std::string displacement_svg(const StudySummary& summary, const StudyConfig& con
                       "The largest displacement over all objects while the scene settles with the placed object. "
                       "Smaller values than " +
                           plain(kDisplayFloor) + " are drawn there."});
+}
+
+std::string series_svg(const StudySummary& summary) {
+  return draw_figure({series_panel(summary, true), series_panel(summary, false)},
+                     {"All series on the same scenes, against the noise scale of each one's own sensor; bands: 95 % "
+                      "bootstrap intervals."});
 }
 
 std::string success_svg(const StudySummary& summary, const StudyConfig& config) {

@@ -66,24 +66,24 @@ const std::vector<TableRow>& table_rows() {
   return rows;
 }
 
-std::string summary_table(const StudySummary& summary) {
+std::string summary_table(const std::vector<StudyPoint>& points) {
   std::string html = "<div class=\"wide\"><table>\n<thead><tr><th>Noise scale</th>";
-  for (const StudyPoint& p : summary.points) html += "<th>" + plain(p.noise_scale) + "</th>";
+  for (const StudyPoint& p : points) html += "<th>" + plain(p.noise_scale) + "</th>";
   html += "</tr>\n<tr><td>Depth σ, mm</td>";
-  for (const StudyPoint& p : summary.points) html += "<td>" + number(p.depth_sigma_mm) + "</td>";
+  for (const StudyPoint& p : points) html += "<td>" + number(p.depth_sigma_mm) + "</td>";
   html += "</tr>\n<tr><td>Trials</td>";
-  for (const StudyPoint& p : summary.points) html += "<td>" + std::to_string(p.trials) + "</td>";
+  for (const StudyPoint& p : points) html += "<td>" + std::to_string(p.trials) + "</td>";
   html += "</tr></thead>\n<tbody>\n";
   for (const TableRow& row : table_rows()) {
     html += std::string("<tr><td>") + row.title + "</td>";
-    for (const StudyPoint& p : summary.points) {
+    for (const StudyPoint& p : points) {
       html += row.is_share ? cell(p.shares.at(row.name), 100.0) : cell(p.medians.at(row.name));
     }
     html += "</tr>\n";
   }
   for (std::size_t i = 0; i < failure_names().size(); ++i) {
     html += "<tr><td>Failed first: " + failure_titles()[i] + ", %</td>";
-    for (const StudyPoint& p : summary.points)
+    for (const StudyPoint& p : points)
       html += "<td>" + number(100.0 * p.failures.at(failure_names()[i])) + "</td>";
     html += "</tr>\n";
   }
@@ -100,6 +100,21 @@ std::string reference_table(const StudySummary& summary) {
          "</tbody></table></div>\n";
 }
 
+std::string summary_tables(const StudySummary& summary) {
+  if (summary.series.size() == 1) return summary_table(summary.base());
+  std::string html;
+  for (const StudySeries& series : summary.series) {
+    if (series.points.empty()) continue;
+    html += "<h3>Series: " + html_escaped(series.title) + "</h3>\n" + summary_table(series.points);
+  }
+  return html;
+}
+
+std::string comparison(const StudySummary& summary) {
+  if (summary.series.size() == 1) return "";
+  return "<h2>The series side by side</h2>\n<figure>" + series_svg(summary) + "</figure>\n";
+}
+
 // Besides the reports' common style: tables that scroll on a narrow screen, and what print needs.
 constexpr const char* kStyle = R"(<style>
   figure { margin: 14px 0; overflow-x: auto; } figure svg { width: 100%; min-width: 640px; height: auto; }
@@ -112,8 +127,8 @@ constexpr const char* kStyle = R"(<style>
 )";
 
 std::string lead(const StudySummary& summary, const StudyConfig& config) {
-  const StudyPoint& first = summary.points.front();
-  const StudyPoint& last = summary.points.back();
+  const StudyPoint& first = summary.base().front();
+  const StudyPoint& last = summary.base().back();
   const auto clause = [](const StudyPoint& p) {
     const std::string noise = p.noise_scale == 0.0   ? "without noise"
                               : p.noise_scale == 1.0 ? "at the sensor's own noise"
@@ -121,9 +136,9 @@ std::string lead(const StudySummary& summary, const StudyConfig& config) {
     return number(100.0 * p.shares.at("stable_true").value) + " % of the placements stand in the true scene " + noise;
   };
   return "<p class=\"lead\">" + std::to_string(summary.trials) + " trials on " + std::to_string(summary.scenes) +
-         " scenes, one view with " + sensor_title(config.sensor) + " at " + plain(config.distance_m) + " m, objects " +
-         (config.known ? "known" : "unknown") + ". " + clause(first) +
-         (summary.points.size() > 1 ? "; " + clause(last) : "") + ".</p>\n";
+         " scenes" + (config.series.size() > 1 ? " in " + std::to_string(config.series.size()) + " series" : "") +
+         ", one view of each. The first series: " + series_title(config, 0) + ". " + clause(first) +
+         (summary.base().size() > 1 ? "; " + clause(last) : "") + ".</p>\n";
 }
 
 std::string method(const StudyConfig& config, std::uint64_t seed) {
@@ -131,12 +146,12 @@ std::string method(const StudyConfig& config, std::uint64_t seed) {
          "), scanned from a random viewpoint 30° to 60° above the table, and recovered from that one depth image: "
          "table, "
          "segmentation, " +
-         (config.known ? "which of the seven blocks stand where" : "the shapes and poses of unknown objects") +
+         (config.base().known ? "which of the seven blocks stand where" : "the shapes and poses of unknown objects") +
          ". For one more block the model draws " + std::to_string(config.samples) + " poses in " +
          std::to_string(config.steps) +
          " steps; they are settled in the recovered scene and the best-ranked one is taken. "
          "Its pose relative to the camera, which is what a robot has, is then put into the <em>true</em> scene and "
-         "settled there. Trials of one scene share viewpoint, query and all seeds and differ in the noise alone. "
+         "settled there. Trials of one scene share viewing direction, query and all seeds; within a series they differ in the noise alone. "
          "Seed " +
          std::to_string(seed) +
          ".</p>\n"
@@ -171,7 +186,8 @@ std::string study_html(const StudySummary& summary, const StudyConfig& config, s
   return html_begin(title) + kStyle + "<h1>" + title + "</h1>\n" + lead(summary, config) +
          "<h2>Displacement against noise</h2>\n<figure>" + displacement_svg(summary, config) + "</figure>\n" +
          "<h2>Success, and what fails</h2>\n<figure>" + success_svg(summary, config) + "</figure>\n" +
-         "<h2>In numbers</h2>\n<p>Shares, and medians with their 95 % intervals.</p>\n" + summary_table(summary) +
+         comparison(summary) + "<h2>In numbers</h2>\n<p>Shares, and medians with their 95 % intervals.</p>\n" +
+         summary_tables(summary) +
          reference_table(summary) + "<h2>What was done</h2>\n" + method(config, seed) + html_end();
 }
 
@@ -180,6 +196,8 @@ void write_study(const std::string& directory, const std::vector<StudyRow>& rows
   write_file(directory + "/trials.csv", trials_csv(rows));
   write_file(directory + "/summary.json", to_json(summary, settings).dump(2) + "\n");
   write_file(directory + "/displacement.svg", displacement_svg(summary, config));
+  write_file(directory + "/success.svg", success_svg(summary, config));
+  if (summary.series.size() > 1) write_file(directory + "/series.svg", series_svg(summary));
   write_file(directory + "/report.html", study_html(summary, config, seed));
 }
 
@@ -195,10 +213,13 @@ std::string study_text(const StudySummary& summary) {
                   number(deg.value).c_str(), stand.c_str());
     out += line;
   };
-  for (const StudyPoint& p : summary.points) {
-    add(plain(p.noise_scale), p.trials, p.medians.at("displacement_true_pct"), p.medians.at("displacement_true_deg"),
-        number(100.0 * p.shares.at("stable_recovered").value) + " / " +
-            number(100.0 * p.shares.at("stable_true").value) + " %");
+  for (const StudySeries& series : summary.series) {
+    if (summary.series.size() > 1) out += series.title + "\n";
+    for (const StudyPoint& p : series.points) {
+      add(plain(p.noise_scale), p.trials, p.medians.at("displacement_true_pct"), p.medians.at("displacement_true_deg"),
+          number(100.0 * p.shares.at("stable_recovered").value) + " / " +
+              number(100.0 * p.shares.at("stable_true").value) + " %");
+    }
   }
   const auto reference = [&](const char* name, const StudyReference& r) {
     add(name, summary.scenes, r.pct, r.deg, number(100.0 * r.stable.value) + " %");

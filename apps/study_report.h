@@ -1,4 +1,4 @@
-// What a study leaves: trials.csv, summary.json, displacement.svg and report.html.
+// What a study leaves: trials.csv, summary.json, its figures and report.html.
 #pragma once
 
 #include <string>
@@ -12,7 +12,7 @@ namespace dofusion {
 
 std::string trials_csv(const std::vector<StudyRow>& rows);
 
-// One page with both figures, the summary as tables, and what was done; opens without a network.
+// One page with the figures, the summary as tables, and what was done; opens without a network.
 std::string study_html(const StudySummary& summary, const StudyConfig& config, std::uint64_t seed);
 
 // Writes all of it into `directory`, which must exist; `settings` is study_settings' text.

@@ -16,6 +16,7 @@ template <class Row, class Visit>
 void for_each_column(Row& row, Visit visit) {
   visit("trial", row.trial);
   visit("scene", row.scene);
+  visit("series", row.series);
   visit("noise_scale", row.noise_scale);
   visit("sensor", row.sensor);
   visit("distance_m", row.distance_m);

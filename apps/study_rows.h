@@ -15,7 +15,8 @@ namespace dofusion {
 // recovered or placed; a simulation that diverged has no displacement.
 struct StudyRow {
   std::int64_t trial = 0;
-  std::int64_t scene = 0;  // trials of one scene share blocks, viewpoint, query and seeds and differ in the noise
+  std::int64_t scene = 0;  // trials of one scene share blocks, viewing direction, query and seeds
+  int series = 0;          // of the configuration: the condition under which it was looked at
   double noise_scale = 0.0;
   std::string sensor;
   double distance_m = 0.0;
@@ -40,7 +41,7 @@ struct StudyRow {
   std::optional<bool> stable_recovered;
   std::optional<double> displacement_true_pct, displacement_true_deg;
   std::optional<bool> stable_true;
-  // The two references, the same in all trials of a scene: placed on the true scene with the same seed, and at random.
+  // The two references, the same in all trials of a scene, by the first series' model: placed on the true scene with the same seed, and at random.
   std::optional<double> displacement_ground_truth_pct, displacement_ground_truth_deg;
   bool stable_ground_truth = false;
   std::optional<double> displacement_random_pct, displacement_random_deg;

@@ -78,10 +78,10 @@ Estimate mean_of(const Rows& rows, const Quantity& quantity, Rng& rng) {
   return {mean, bootstrap_mean(values, rng), static_cast<int>(values.size())};
 }
 
-StudyPoint point_of(const Rows& rows, double noise_scale, const StudyConfig& config, Rng& rng) {
+StudyPoint point_of(const Rows& rows, double noise_scale, const StudyCondition& condition, Rng& rng) {
   StudyPoint point;
   point.noise_scale = noise_scale;
-  point.depth_sigma_mm = depth_sigma_mm(config, noise_scale);
+  point.depth_sigma_mm = depth_sigma_mm(condition, noise_scale);
   point.trials = static_cast<int>(rows.size());
   for (const Quantity& quantity : medians()) point.medians[quantity.name] = median_of(rows, quantity, rng);
   for (const Quantity& quantity : shares()) point.shares[quantity.name] = mean_of(rows, quantity, rng);
@@ -136,13 +136,18 @@ StudySummary summarise(const std::vector<StudyRow>& rows, const StudyConfig& con
   StudySummary summary;
   summary.trials = static_cast<int>(rows.size());
   Rng rng = make_rng(seed, 0x626f6f74ull);
-  for (const double scale : config.noise_scales) {
-    Rows chosen;
-    for (const StudyRow& row : rows) {
-      // By what the file says of the scale, which is rounded.
-      if (std::abs(row.noise_scale - scale) <= 1e-5 * std::max(1.0, scale)) chosen.push_back(row);
+  for (std::size_t s = 0; s < config.series.size(); ++s) {
+    StudySeries& series = summary.series.emplace_back();
+    series.title = series_title(config, s);
+    for (const double scale : config.noise_scales) {
+      Rows chosen;
+      for (const StudyRow& row : rows) {
+        // By what the file says of the scale, which is rounded.
+        const bool here = std::abs(row.noise_scale - scale) <= 1e-5 * std::max(1.0, scale);
+        if (here && row.series == static_cast<int>(s)) chosen.push_back(row);
+      }
+      if (!chosen.empty()) series.points.push_back(point_of(chosen, scale, config.series[s], rng));
     }
-    if (!chosen.empty()) summary.points.push_back(point_of(chosen, scale, config, rng));
   }
   Rows scenes;
   std::set<std::int64_t> seen;
@@ -160,8 +165,12 @@ nlohmann::ordered_json to_json(const StudySummary& summary, const std::string& s
   json["trials"] = summary.trials;
   json["scenes"] = summary.scenes;
   json["references"] = {{"ground_truth", to_json(summary.ground_truth)}, {"random", to_json(summary.random)}};
-  json["noise"] = nlohmann::ordered_json::array();
-  for (const StudyPoint& point : summary.points) json["noise"].push_back(to_json(point));
+  json["series"] = nlohmann::ordered_json::array();
+  for (const StudySeries& series : summary.series) {
+    nlohmann::ordered_json points = nlohmann::ordered_json::array();
+    for (const StudyPoint& point : series.points) points.push_back(to_json(point));
+    json["series"].push_back({{"title", series.title}, {"noise", points}});
+  }
   return json;
 }
 

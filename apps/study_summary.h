@@ -19,7 +19,7 @@ struct Estimate {
   int count = 0;       // values it is made of
 };
 
-// All trials at one noise scale.
+// All trials of one series at one noise scale.
 struct StudyPoint {
   double noise_scale = 0.0;
   double depth_sigma_mm = 0.0;
@@ -29,6 +29,11 @@ struct StudyPoint {
   std::map<std::string, double> failures;   // 0 … 1, by failure_names(); with the share of stable_true they make 1
 };
 
+struct StudySeries {
+  std::string title;               // series_title()
+  std::vector<StudyPoint> points;  // by ascending noise scale
+};
+
 // A reference: every scene once.
 struct StudyReference {
   Estimate pct, deg, stable;
@@ -36,8 +41,10 @@ struct StudyReference {
 
 struct StudySummary {
   int trials = 0, scenes = 0;
-  std::vector<StudyPoint> points;  // by ascending noise scale
+  std::vector<StudySeries> series;  // as in the configuration
   StudyReference ground_truth, random;
+
+  const std::vector<StudyPoint>& base() const { return series.front().points; }
 };
 
 // A trial without a displacement, because nothing was placed or the simulation diverged, counts as larger than any;

@@ -50,6 +50,7 @@ std::vector<SceneDataset> read_scenes(const TrainSettings& settings, Split split
   DatasetFilter filter;
   filter.split = split;
   filter.without_shape = settings.held_out_shape;
+  for (const std::string& task : settings.tasks) filter.tasks.push_back(task_from_string(task));
   std::vector<SceneDataset> datasets;
   for (const std::string& path : settings.data) datasets.push_back(read_dataset(path, filter));
   return datasets;

@@ -13,6 +13,7 @@ namespace dofusion {
 struct TrainSettings {
   std::string preset = "default", config_path, held_out_shape;
   std::vector<std::string> data;
+  std::vector<std::string> tasks;  // scenes of these alone; empty: all
   int validation = 100;  // scenes of the data's validation split that are sampled and settled; 0: none
   int rank = 0, processes = 1;
   std::string rendezvous;  // host:port of rank 0

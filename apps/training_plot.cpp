@@ -38,6 +38,24 @@ std::vector<LogLine> parse(const std::string& csv) {
   return lines;
 }
 
+// At most `most` lines: each the mean of as many that follow one another, with the last validation among them.
+std::vector<LogLine> thinned(const std::vector<LogLine>& lines, std::size_t most) {
+  const std::size_t together = (lines.size() + most - 1) / most;
+  std::vector<LogLine> result;
+  for (std::size_t begin = 0; begin < lines.size(); begin += together) {
+    const std::size_t end = std::min(begin + together, lines.size());
+    LogLine mean;
+    for (std::size_t i = begin; i < end; ++i) {
+      const double share = 1.0 / static_cast<double>(end - begin);
+      for (std::size_t k = 0; k < mean.loss.size(); ++k) mean.loss[k] += share * lines[i].loss[k];
+      mean.samples_millions = lines[i].samples_millions;
+      mean.validation = lines[i].validation;
+    }
+    result.push_back(mean);
+  }
+  return result;
+}
+
 std::string text_of(double value) {
   char text[24];
   std::snprintf(text, sizeof text, "%.4g", value);
@@ -65,7 +83,8 @@ double rounded_up(double value) {
 }  // namespace
 
 std::string training_plot(const std::string& csv) {
-  const std::vector<LogLine> lines = parse(csv);
+  constexpr std::size_t kMostPoints = 40;  // of a curve, that markers may be told apart
+  const std::vector<LogLine> lines = thinned(parse(csv), kMostPoints);
   const double last = lines.empty() ? 1.0 : lines.back().samples_millions;
   double highest = 0.1;
   for (const LogLine& line : lines)

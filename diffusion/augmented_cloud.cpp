@@ -105,26 +105,57 @@ void CloudShape::set_surface(const TriangleMesh& mesh) {
     area += 0.5f * t.ab.cross(t.ac).norm();
     cumulative_area_.push_back(area);
   }
+  sharp_ = sharp_features(mesh);
+  float length = 0.0f;
+  for (const SharpFeatures::Edge& edge : sharp_.edges) {
+    length += static_cast<float>((edge.to - edge.from).norm());
+    cumulative_length_.push_back(length);
+  }
 }
 
-void CloudShape::sample(int count, Rng& rng, const Columns& point, const Columns& normal) const {
-  const float total = cumulative_area_.back();
-  for (int i = 0; i < count; ++i) {
-    const std::uint64_t first = rng(), second = rng();
-    const float pick = quick_uniform(static_cast<std::uint32_t>(second)) * total;
-    const auto found = std::upper_bound(cumulative_area_.begin(), cumulative_area_.end() - 1, pick);
-    float u = quick_uniform(static_cast<std::uint32_t>(first >> 32));
-    float v = quick_uniform(static_cast<std::uint32_t>(first));
-    if (u + v > 1) {
-      u = 1 - u;
-      v = 1 - v;
-    }
-    const Triangle& triangle = surface_[static_cast<std::size_t>(found - cumulative_area_.begin())];
-    const Eigen::Vector3f p = triangle.a + u * triangle.ab + v * triangle.ac;
+Eigen::Vector3f CloudShape::surface_point(Rng& rng, Eigen::Vector3f& normal) const {
+  const std::uint64_t first = rng(), second = rng();
+  const float pick = quick_uniform(static_cast<std::uint32_t>(second)) * cumulative_area_.back();
+  const auto found = std::upper_bound(cumulative_area_.begin(), cumulative_area_.end() - 1, pick);
+  float u = quick_uniform(static_cast<std::uint32_t>(first >> 32));
+  float v = quick_uniform(static_cast<std::uint32_t>(first));
+  if (u + v > 1) {
+    u = 1 - u;
+    v = 1 - v;
+  }
+  const Triangle& triangle = surface_[static_cast<std::size_t>(found - cumulative_area_.begin())];
+  normal = triangle.normal;
+  return triangle.a + u * triangle.ab + v * triangle.ac;
+}
+
+Eigen::Vector3f CloudShape::edge_point(Rng& rng) const {
+  const std::uint64_t bits = rng();
+  const float pick = quick_uniform(static_cast<std::uint32_t>(bits >> 32)) * cumulative_length_.back();
+  const auto found = std::upper_bound(cumulative_length_.begin(), cumulative_length_.end() - 1, pick);
+  const SharpFeatures::Edge& edge = sharp_.edges[static_cast<std::size_t>(found - cumulative_length_.begin())];
+  const float along = quick_uniform(static_cast<std::uint32_t>(bits));
+  return (edge.from + along * (edge.to - edge.from)).cast<float>();
+}
+
+void CloudShape::sample(int count, double sharp, Rng& rng, const Columns& point, const Columns& normal) const {
+  const auto put = [&](int i, const Eigen::Vector3f& p, const Eigen::Vector3f& n) {
     for (int d = 0; d < 3; ++d) {
       point[d][i] = p[d];
-      normal[d][i] = triangle.normal[d];
+      normal[d][i] = n[d];
     }
+  };
+  const int on_edges = sharp_.edges.empty() ? 0 : static_cast<int>(std::lround(sharp * count));
+  const int corners = static_cast<int>(sharp_.corners.size());
+  for (int i = 0; i < on_edges; ++i) {
+    const bool corner = i < corners;
+    const int which = corners <= on_edges || !corner ? i : uniform_int(rng, 0, corners - 1);
+    put(i, corner ? sharp_.corners[static_cast<std::size_t>(which)].cast<float>().eval() : edge_point(rng),
+        Eigen::Vector3f::Zero());
+  }
+  for (int i = on_edges; i < count; ++i) {
+    Eigen::Vector3f n;
+    const Eigen::Vector3f p = surface_point(rng, n);
+    put(i, p, n);
   }
 }
 
@@ -255,7 +286,7 @@ void make_augmented_cloud(const std::vector<CloudShapePtr>& shapes, const std::v
     const int n = shares[static_cast<std::size_t>(i)];
     const Pose& T_world_i = T_world_object[static_cast<std::size_t>(i)];
     const Eigen::Matrix3f R = T_world_i.linear().cast<float>();
-    shapes[static_cast<std::size_t>(i)]->sample(n, rng, local, local_normal);
+    shapes[static_cast<std::size_t>(i)]->sample(n, options.sharp_share, rng, local, local_normal);
     transform(R, (T_world_i.translation() - options.origin).cast<float>(), n, readable(local), world);
     transform(R, Eigen::Vector3f::Zero(), n, readable(local_normal), normal);
     std::fill_n(distance, n, std::numeric_limits<float>::max());

@@ -27,6 +27,7 @@ void for_each_field(Config& c, Visit visit) {
   visit("contact_scales", c.contact_scales);
   visit("directions", c.directions);
   visit("query_share", c.query_share);
+  visit("sharp_share", c.sharp_share);
   visit("point_head", c.point_head);
   visit("equivalent", c.equivalent);
   visit("use_sdf", c.use_sdf);
@@ -119,10 +120,11 @@ void check(const ModelConfig& c, const std::string& source) {
   require(c.hidden >= 1 && c.hidden <= 4096 && (paper || c.hidden % 32 == 0),
           "hidden must be a multiple of 32, at most 4096");
   require(c.query_share >= 0 && c.query_share < 1, "query_share must be at least 0 and below 1");
+  require(c.sharp_share >= 0 && c.sharp_share <= 1, "sharp_share must be between 0 and 1");
   require(c.point_head >= 0 && c.point_head <= 1024 && c.point_head % 32 == 0,
           "point_head must be a multiple of 32, at most 1024");
-  require(!paper || (!c.directions && c.query_share == 0 && c.point_head == 0 && !c.equivalent),
-          "directions, query_share, point_head and equivalent belong to the default preset");
+  require(!paper || (!c.directions && c.query_share == 0 && c.sharp_share == 0 && c.point_head == 0 && !c.equivalent),
+          "directions, query_share, sharp_share, point_head and equivalent belong to the default preset");
   require(c.noise_frequencies >= 0 && c.noise_frequencies <= 32, "noise_frequencies must be between 0 and 32");
   require(c.sigma_min > 0 && c.sigma_max > c.sigma_min && c.sigma_max < 100,
           "0 < sigma_min < sigma_max < 100 must hold");

@@ -29,6 +29,7 @@ struct ModelConfig {
   std::vector<double> contact_scales = {0.1, 0.01};  // heights and distances also enter as v / (|v| + scale)
   bool directions = false;    // surface normals and directions of the distance enter as well
   double query_share = 0.0;   // of the points, on the query; 0: all objects get equal shares
+  double sharp_share = 0.0;   // of each object's points, on its edges and corners
   int point_head = 0;         // hidden channels of the forces on the query's points (point_head.h); 0: none
   bool equivalent = false;    // the target in training is the nearest of a symmetric shape's equal poses
   bool use_sdf = true;                               // ablations of table V

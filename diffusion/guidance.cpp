@@ -24,7 +24,7 @@ struct Points {
 
 Points sampled(const CloudShape& shape, int count, Rng& rng) {
   Points points(count), normals(count);
-  shape.sample(count, rng, points.columns(), normals.columns());
+  shape.sample(count, 0.0, rng, points.columns(), normals.columns());
   return points;
 }
 

@@ -7,6 +7,7 @@
 #include <map>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
 #include "diffusion/augmented_cloud.h"
 #include "diffusion/network.h"
@@ -112,7 +113,8 @@ struct PlacementModel::Impl {
       } else {
         // A part of the old noise may be kept instead of drawing all of it afresh.
         const double keep = std::sqrt(1.0 - options.freshness * options.freshness);
-        const Vector6 old = keep > 0 ? Vector6(-predicted * next * keep) : Vector6(Vector6::Zero());
+        Vector6 old = -predicted * next * keep;
+        old.tail<3>() *= rotation_scale(sigma) / sigma;  // residuals of rotation are in another unit than noise
         walk.poses[0] = add_world_noise(clean, old + noise6(walk.rng, next * options.freshness), walk.length);
       }
     }
@@ -120,10 +122,13 @@ struct PlacementModel::Impl {
 };
 
 PlacementModel::PlacementModel(const ModelConfig& config, const std::vector<float>& parameters)
+    : PlacementModel(config, make_network(config)) {
+  impl_->network->set_parameters(parameters);
+}
+PlacementModel::PlacementModel(const ModelConfig& config, std::unique_ptr<Network> network)
     : impl_(std::make_unique<Impl>()) {
   impl_->config = config;
-  impl_->network = make_network(config);
-  impl_->network->set_parameters(parameters);
+  impl_->network = std::move(network);
 }
 PlacementModel::~PlacementModel() = default;
 PlacementModel::PlacementModel(PlacementModel&&) noexcept = default;

@@ -9,6 +9,7 @@
 
 #include "diffusion/config.h"
 #include "diffusion/guidance.h"
+#include "diffusion/network.h"
 #include "stability/scene.h"
 
 namespace dofusion {
@@ -32,7 +33,9 @@ struct SamplerOptions {
   int points = 0;  // of each cloud; 0: as in training. Even
   int threads = 1;
   double start_sigma = 0.0;  // noise scale at the start, normalised; 0: the model's largest
-  // How much of each step's noise is fresh: 1 is equation (2). Less was far worse in a probe.
+  // How much of each step's noise is fresh; 0 is a deterministic process. 1 is equation (2): it follows a network that
+  // errs best, but of the poses that a mode allows it takes the ones near its middle. What keeps the density's spread is
+  // ancestral sampling, sqrt(1 - r^2) for steps that shrink the noise by a factor r.
   double freshness = 1.0;
 };
 
@@ -43,6 +46,8 @@ class PlacementModel {
 
   // A model from parameters in memory (flat, as Network's).
   PlacementModel(const ModelConfig& config, const std::vector<float>& parameters);
+  // A network of one's own that takes the inputs that `config` describes; its parameters are set.
+  PlacementModel(const ModelConfig& config, std::unique_ptr<Network> network);
   ~PlacementModel();
   PlacementModel(PlacementModel&&) noexcept;
   PlacementModel& operator=(PlacementModel&&) noexcept;

@@ -46,10 +46,31 @@ TrainingSet::TrainingSet(std::vector<SceneDataset> datasets, const ModelConfig& 
           throw InputError("scene " + std::to_string(record.index) + " of the dataset has a pose that is not finite");
         object.shape += first;
       }
-      if (!record.objects.empty()) scenes_.push_back(std::move(record.objects));
+      if (!record.objects.empty()) scenes_.push_back({std::move(record.objects), record.task == Task::kStack});
     }
   }
   if (scenes_.empty()) throw InputError("there is no scene to train on");
+  const auto objects_of = [](const TrainingScene& scene) { return static_cast<int>(scene.objects.size()); };
+  std::stable_sort(scenes_.begin(), scenes_.end(), [&](const TrainingScene& a, const TrainingScene& b) {
+    return objects_of(a) < objects_of(b);
+  });
+  for (int begin = 0, end = 0; begin < static_cast<int>(scenes_.size()); begin = end) {
+    const int objects = objects_of(scenes_[static_cast<std::size_t>(begin)]);
+    while (end < static_cast<int>(scenes_.size()) && objects_of(scenes_[static_cast<std::size_t>(end)]) == objects) ++end;
+    by_count_.emplace_back(begin, end);
+    weight_ += objects;
+  }
+}
+
+const TrainingSet::TrainingScene& TrainingSet::draw_scene(Rng& rng) const {
+  int left = uniform_int(rng, 0, weight_ - 1);
+  auto chosen = by_count_.begin();
+  const auto objects = [&] { return static_cast<int>(scenes_[static_cast<std::size_t>(chosen->first)].objects.size()); };
+  while (left >= objects()) {
+    left -= objects();
+    ++chosen;
+  }
+  return scenes_[static_cast<std::size_t>(uniform_int(rng, chosen->first, chosen->second - 1))];
 }
 
 CloudShapePtr TrainingSet::cloud_shape(const Shape& shape, const Eigen::Vector3d& scale) const {
@@ -96,9 +117,9 @@ Pose TrainingSet::nearest_equivalent(const Shape& shape, const Eigen::Vector3d& 
 void TrainingSet::append(std::uint64_t seed, std::uint64_t example, NetworkInput& batch,
                          std::vector<float>& target_values) const {
   Rng rng = make_rng(seed, example);
-  const auto& objects = scenes_[static_cast<std::size_t>(uniform_int(rng, 0, static_cast<int>(scenes_.size()) - 1))];
-  const int count = static_cast<int>(objects.size());
-  const int query = uniform_int(rng, 0, count - 1);
+  const auto& [objects, stack] = draw_scene(rng);
+  const int last = static_cast<int>(objects.size()) - 1;
+  const int query = stack ? last : uniform_int(rng, 0, last);
   const Eigen::AngleAxisd yaw(uniform(rng, 0.0, 2.0 * M_PI), Eigen::Vector3d::UnitZ());
   const bool mirror = uniform(rng) < 0.5 && std::all_of(objects.begin(), objects.end(),
                                                         [&](const SceneObject& o) { return shapes_[o.shape].mirrors; });
@@ -140,6 +161,7 @@ void append_input(const ModelConfig& config, const std::vector<CloudShapePtr>& s
   CloudOptions options;
   options.points = points;
   options.query_points = static_cast<int>(std::lround(config.query_share * points));
+  options.sharp_share = config.sharp_share;
   options.length = length;
   options.distance_limit = config.distance_limit;
   options.origin.head<2>() = paper ? origin : pose.translation().head<2>();

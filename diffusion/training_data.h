@@ -1,9 +1,11 @@
-// Training examples drawn from datasets of stable scenes: a random object of a random scene becomes the query, the
-// scene is turned by a random yaw (and mirrored where the shapes allow it), the query's pose gets noise.
+// Training examples drawn from datasets of stable scenes. First the number of objects is drawn, each that there is with
+// a probability proportional to itself: crowded scenes are the hard ones, and often the fewest. Then a scene of so many;
+// a random object, of a stack its top, becomes the query, the scene is turned by a random yaw (and mirrored where the shapes allow it), the query's pose gets noise.
 #pragma once
 
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "diffusion/augmented_cloud.h"
@@ -31,12 +33,20 @@ class TrainingSet {
     bool mirrors = false;  // its own mirror image in y
     ShapeSymmetry symmetry;  // of config.equivalent
   };
+  struct TrainingScene {
+    std::vector<SceneObject> objects;  // with indices into shapes_
+    bool stack = false;                // the last object is the only query
+  };
   CloudShapePtr cloud_shape(const Shape& shape, const Eigen::Vector3d& scale) const;
   Pose nearest_equivalent(const Shape& shape, const Eigen::Vector3d& scale, const Pose& clean, const Pose& noisy) const;
 
   ModelConfig config_;
   std::vector<Shape> shapes_;
-  std::vector<std::vector<SceneObject>> scenes_;  // with indices into shapes_
+  const TrainingScene& draw_scene(Rng& rng) const;
+
+  std::vector<TrainingScene> scenes_;          // by number of objects
+  std::vector<std::pair<int, int>> by_count_;  // begin and end in scenes_ of those of one number of objects
+  int weight_ = 0;                             // sum of those numbers
 };
 
 // One example's network input: the cloud of the scene with the query at its noisy pose, and pose features. `origin`:

@@ -114,7 +114,9 @@ class SceneChoice {
 
   bool takes(const SceneTables& t, std::size_t i) const {
     if (filter_.split && static_cast<Split>(t.split[i]) != *filter_.split) return false;
-    if (filter_.task && static_cast<Task>(t.task[i]) != *filter_.task) return false;
+    const auto& tasks = filter_.tasks;
+    if (!tasks.empty() && std::find(tasks.begin(), tasks.end(), static_cast<Task>(t.task[i])) == tasks.end())
+      return false;
     if (filter_.objects && t.start[i + 1] - t.start[i] != *filter_.objects) return false;
     const auto has = [&](const std::vector<bool>& of_shape) {
       return std::any_of(t.shape.begin() + t.start[i], t.shape.begin() + t.start[i + 1],

@@ -75,7 +75,7 @@ struct SceneDataset {
 // Which scenes of a file to take: those that meet every condition.
 struct DatasetFilter {
   std::optional<Split> split;
-  std::optional<Task> task;
+  std::vector<Task> tasks;          // one of these; empty: any
   std::optional<int> objects;       // exactly so many
   std::string with_shape;           // at least one object of this name; empty: any
   std::string without_shape;        // no object of this name; empty: any

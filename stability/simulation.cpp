@@ -137,7 +137,10 @@ SettleResult Simulation::settle(const PhysicsOptions& options, const Loads& load
 void Simulation::record(const Recording& recording) {
   if (recording.frames == nullptr) return;
   if (data_->time * recording.frames_per_second < static_cast<double>(recording.frames->size())) return;
+  // Kinematics normalises quaternions in place: a motion that is looked at would differ in the last digit.
+  const std::vector<mjtNum> qpos(data_->qpos, data_->qpos + model_->nq);
   recording.frames->push_back(poses());
+  std::copy(qpos.begin(), qpos.end(), data_->qpos);
 }
 
 // Collision once more, for surfaces up to kTouchingGap apart as well.

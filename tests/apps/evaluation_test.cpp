@@ -2,6 +2,7 @@
 #include "apps/evaluation_tables.h"
 
 #include <cmath>
+#include <limits>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -99,6 +100,68 @@ TEST(SettlePlacements, ThreadsChangeNothing) {
   }
 }
 
+TEST(Instances, OfDatasetsAreSpreadOverTheirScenesAndOfStacksTakeTheTop) {
+  SceneDataset dataset;
+  dataset.shapes = {make_block("cube"), make_block("hat")};
+  for (int i = 0; i < 10; ++i) {
+    SceneRecord record;
+    record.task = Task::kStack;
+    record.objects.resize(2);
+    record.objects[1].shape = 1;
+    record.objects[0].T_world_object = at(0.1 * i, 0, 0.025);
+    record.objects[1].T_world_object = at(0.1 * i, 0, 0.065);
+    dataset.scenes.push_back(record);
+  }
+  const std::vector<Instance> instances = instances_of({dataset}, 4, 1);
+  ASSERT_EQ(instances.size(), 4u);
+  const double x[] = {0.0, 0.2, 0.5, 0.7};
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(instances[i].query->name, "hat");
+    ASSERT_EQ(instances[i].context.objects.size(), 1u);
+    EXPECT_EQ(instances[i].context.objects[0]->name, "cube");
+    EXPECT_NEAR(instances[i].T_world_query.translation().x(), x[i], 1e-12);
+    EXPECT_TRUE(instances[i].context_stands);
+  }
+  EXPECT_EQ(instances_of({dataset}, 100, 1).size(), 10u);
+
+  // Without its foot the upper one hangs in the air: a context that needs its query.
+  for (SceneRecord& record : dataset.scenes) {
+    record.task = Task::kUnstructured;
+    record.objects[0].T_world_object.translation().z() = 0.4;
+    record.objects[1].T_world_object.translation().z() = 0.44;
+  }
+  for (const Instance& instance : instances_of({dataset}, 10, 1)) EXPECT_FALSE(instance.context_stands);
+}
+
+TEST(ContactModes, AreWhatTheQueryTouches) {
+  std::vector<Outcome> outcomes(4);
+  for (Outcome& outcome : outcomes) outcome.stable = true;
+  EXPECT_EQ(contact_mode_name(contact_mode(outcomes[0])), "held by none");
+  outcomes[0].on_table = true;
+  EXPECT_EQ(contact_mode_name(contact_mode(outcomes[0])), "table alone");
+  outcomes[1].touches = 1;
+  EXPECT_EQ(contact_mode_name(contact_mode(outcomes[1])), "one object");
+  outcomes[2].on_table = true;
+  outcomes[2].touches = 5;
+  EXPECT_EQ(contact_mode_name(contact_mode(outcomes[2])), "table and several objects");
+  outcomes[3] = outcomes[2];
+
+  EXPECT_NEAR(contact_entropy(outcomes), 1.5, 1e-12);  // shares of 1/4, 1/4, 1/2
+  outcomes[0].stable = outcomes[1].stable = false;     // what fell counts for nothing
+  EXPECT_EQ(contact_entropy(outcomes), 0.0);
+  EXPECT_EQ(contact_entropy({}), 0.0);
+}
+
+TEST(SupportShare, CountsContextsThatFallWithoutTheQuery) {
+  std::vector<Instance> instances(4, onto_one_cube(Task::kUnstructured));
+  std::vector<Outcome> outcomes(4);
+  outcomes[0].stable = true;
+  EXPECT_TRUE(std::isnan(support_share(instances, outcomes)));
+  instances[1].context_stands = instances[2].context_stands = instances[3].context_stands = false;
+  outcomes[3].stable = true;
+  EXPECT_NEAR(support_share(instances, outcomes), 1.0 / 3.0, 1e-12);
+}
+
 TEST(RandomPlacements, SeedRepeats) {
   const std::vector<Instance> instances(3, onto_one_cube(Task::kUnstructured));
   const auto a = random_placements(instances, 1), b = random_placements(instances, 1), c = random_placements(instances, 2);
@@ -141,6 +204,27 @@ TEST(TableRows, MedianIntervalBaselineAndThePapersFigures) {
   EXPECT_NEAR(rows[4]["dofusion"].get<double>(), 200.0 / 3.0, 1e-9);
   EXPECT_THAT(format_rows(rows), testing::AllOf(testing::HasSubstr("Cube"), testing::HasSubstr("103.1")));
   EXPECT_THROW(table_rows("nonsense", instances, {ours, {}, random}, 9), std::invalid_argument);
+}
+
+TEST(AblationRows, AreOneForEachVariantAndColumnWithThePapersFigures) {
+  const std::vector<Instance> instances(3, onto_one_cube(Task::kUnstructured));
+  std::vector<Variant> variants(2);
+  variants[0].name = "full";
+  variants[1].name = "w/o SDF";
+  for (Variant& variant : variants) {
+    variant.outcomes.seen.resize(3);
+    for (Outcome& outcome : variant.outcomes.seen) outcome.displacement = {variant.name == "full" ? 1.0 : 7.0, 2.0};
+  }
+  variants[0].outcomes.seen[0].stable = true;
+  const nlohmann::json rows = ablation_rows(instances, variants, 4);
+  ASSERT_EQ(rows.size(), 6u);
+  EXPECT_EQ(rows[0]["block"], "full");
+  EXPECT_EQ(rows[0]["dofusion"], 1.0);
+  EXPECT_EQ(rows[1]["block"], "w/o SDF");
+  EXPECT_EQ(rows[1]["dofusion"], 7.0);
+  EXPECT_GT(rows[1]["paper"].get<double>(), rows[0]["paper"].get<double>());
+  EXPECT_NEAR(rows[4]["dofusion"].get<double>(), 100.0 / 3.0, 1e-9);
+  EXPECT_EQ(rows[5]["dofusion"], 0.0);
 }
 
 }  // namespace

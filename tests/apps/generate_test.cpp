@@ -208,15 +208,6 @@ TEST_F(GenerateTest, BadArgumentsAreRefused) {
 
 class GenerateOnRanksTest : public GenerateTest {
  protected:
-  std::vector<std::string> mpirun(std::vector<std::string> command) const {
-    command[0] = std::string(DOFUSION_BIN_DIR) + "/" + command[0];
-    // What Open MPI leaves behind at its end is not the sanitizers' business here.
-    std::vector<std::string> all = {
-        DOFUSION_MPIRUN, "--allow-run-as-root", "--oversubscribe", "-x", "ASAN_OPTIONS=detect_leaks=0", "-n", "2"};
-    all.insert(all.end(), command.begin(), command.end());
-    return all;
-  }
-
   // Kills the ranks, by the one name that only they have in their arguments; mpirun ends with them.
   void kill_ranks(const std::string& out) const {
     for (const auto& process : std::filesystem::directory_iterator("/proc")) {
@@ -237,13 +228,13 @@ class GenerateOnRanksTest : public GenerateTest {
 TEST_F(GenerateOnRanksTest, TwoGiveTheSameBytesAsOne) {
   auto arguments = words("ranks.h5", "1");
   arguments.insert(arguments.end(), {"--json", directory_ / "done.json"});
-  expect_success(RunningCommand(mpirun(arguments)).wait());
+  expect_success(RunningCommand(on_two_ranks(arguments)).wait());
   EXPECT_EQ(json::parse(read_file(directory_ / "done.json")).at("ranks"), 2);
   EXPECT_TRUE(plain_bytes() == read_file(directory_ / "ranks.h5"));
 }
 
 TEST_F(GenerateOnRanksTest, KilledAndResumedOnOneGivesTheSameBytes) {
-  end_midway(mpirun(words("ranks.h5", "1")), "ranks.h5", [&](RunningCommand&) { kill_ranks("ranks.h5"); });
+  end_midway(on_two_ranks(words("ranks.h5", "1")), "ranks.h5", [&](RunningCommand&) { kill_ranks("ranks.h5"); });
   EXPECT_EQ(size_of(directory_ / "ranks.h5"), 0u);
   EXPECT_GT(size_of(journal("ranks.h5")), 3000u);
   expect_success(generate("ranks.h5"));
@@ -252,7 +243,7 @@ TEST_F(GenerateOnRanksTest, KilledAndResumedOnOneGivesTheSameBytes) {
 
 TEST_F(GenerateOnRanksTest, ErrorsAreOneLineAndTheRightStatus) {
   const auto refused = [&](const std::vector<std::string>& command, const std::string& named) {
-    const CommandResult result = RunningCommand(mpirun(command)).wait();
+    const CommandResult result = RunningCommand(on_two_ranks(command)).wait();
     EXPECT_EQ(result.status, 2) << result.err;
     const auto first = result.err.find("dofusion-generate: ");  // mpirun adds lines of its own
     ASSERT_NE(first, std::string::npos) << result.err;

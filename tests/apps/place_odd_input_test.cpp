@@ -18,7 +18,7 @@ class PlaceOddInputTest : public PlaceTest {
     expect_success(run);
     said_ = run.out;
     EXPECT_LT(run.peak_mb, 3000.0);
-    EXPECT_EQ(entries(out()).size(), 6u);
+    EXPECT_EQ(entries(out()).size(), 7u);
     EXPECT_EQ(segmentation(camera).width, camera.width);
     return run.status == 0 ? placements() : json();
   }

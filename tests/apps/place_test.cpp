@@ -1,5 +1,6 @@
 // dofusion-place on a synthetic scan: what it writes is whole, consistent and stands in MuJoCo.
 #include <cmath>
+#include <cstring>
 #include <fstream>
 #include <memory>
 #include <set>
@@ -80,9 +81,11 @@ void check_outputs(const std::string& out, const json& result, const LabelImage&
   EXPECT_NEAR(sum, 2.0 * result.at("timing_ms").at("total").get<double>(), 1.0);
 }
 
+// That its script asks for nothing from outside either, report_browser_test.mjs sees.
 void check_report(const std::string& out) {
-  const std::string html = read_file(out + "/report.html");
-  for (const char* outside : {"http:", "https:", "<script", "<link", "url("}) EXPECT_THAT(html, Not(HasSubstr(outside)));
+  const std::string whole = read_file(out + "/report.html"), html = whole.substr(0, whole.find("<script"));
+  for (const char* outside : {"http:", "https:", "<link", "url("}) EXPECT_THAT(html, Not(HasSubstr(outside)));
+  EXPECT_THAT(html, HasSubstr("default-src 'none'"));
   const std::string png = "data:image/png;base64,iVBORw0KGgo";  // a PNG's first eight bytes
   int pictures = 0;
   for (std::size_t at = html.find("src=\""); at != std::string::npos; at = html.find("src=\"", at + 1)) {
@@ -90,7 +93,30 @@ void check_report(const std::string& out) {
     ++pictures;
   }
   EXPECT_GE(pictures, 5);  // depth, segmentation, recovered scene, one placement before and after
-  EXPECT_THAT(html, HasSubstr("</html>"));
+  EXPECT_THAT(whole, HasSubstr("</html>"));
+}
+
+// scene.glb has a node for each object and the query, where placements.json puts them, and a motion per placement.
+void check_glb(const std::string& out, const json& result) {
+  const std::string file = read_file(out + "/scene.glb");
+  std::uint32_t length = 0;
+  std::memcpy(&length, file.data() + 12, sizeof length);
+  const json gltf = json::parse(file.substr(20, length));
+  std::vector<Pose> expected;
+  for (const json& object : result.at("objects")) expected.push_back(pose_from_json(object.at("T_world_object")));
+  expected.push_back(pose_from_json(result.at("placements").at(0).at("T_world_query")));
+  std::size_t found = 0;
+  for (const json& node : gltf.at("nodes")) {
+    const std::string name = node.at("name");
+    if (name.rfind("object ", 0) != 0 && name.rfind("query: ", 0) != 0) continue;
+    ASSERT_LT(found, expected.size());
+    const std::vector<double> t = node.at("translation"), q = node.at("rotation");
+    const Pose pose = from_array({t[0], t[1], t[2], q[3], q[0], q[1], q[2]});
+    EXPECT_TRUE(pose.isApprox(expected[found++], 1e-9)) << name;
+  }
+  EXPECT_EQ(found, expected.size());
+  EXPECT_EQ(gltf.at("animations").size(), result.at("placements").size());
+  for (const json& motion : gltf.at("animations")) EXPECT_EQ(motion.at("channels").size(), 2 * expected.size());
 }
 
 // scene.xml in MuJoCo's own loader: the poses are those of placements.json, and in two seconds nothing leaves the
@@ -140,11 +166,12 @@ TEST_F(PlaceTest, KnownBlocksAreFoundAndTheOutputsAreWhole) {
   EXPECT_THAT(run.out, HasSubstr("report: " + out() + "/report.html"));
   EXPECT_EQ(entries(file("work")), std::vector<std::string>{"out"});
   EXPECT_EQ(entries(out()), (std::vector<std::string>{"objects", "placements.json", "query.obj", "report.html",
-                                                      "scene.xml", "segmentation.png"}));
+                                                      "scene.glb", "scene.xml", "segmentation.png"}));
   const json result = placements();
   EXPECT_EQ(json::parse(read_file(file("copy.json"))), result);
   check_outputs(out(), result, segmentation(scan.camera));
   check_report(out());
+  check_glb(out(), result);
   check_scene(out(), result);
 
   EXPECT_EQ(result.at("status"), "ok");
@@ -173,6 +200,7 @@ TEST_F(PlaceTest, UnknownObjectsWithOneThreadAreReproducible) {
   const json result = placements();
   check_outputs(out(), result, segmentation(scan.camera));
   check_report(out());
+  check_glb(out(), result);
   check_scene(out(), result);
   ASSERT_EQ(result.at("objects").size(), 2u);
   EXPECT_FALSE(result.at("objects").at(0).at("known").get<bool>());
@@ -257,7 +285,7 @@ TEST_F(PlaceTest, OtherFilesInTheOutputFolderStay) {
   EXPECT_EQ(read_file(out() + "/notes.txt"), "mine");
   EXPECT_EQ(read_file(out() + "/objects/7.obj"), "mine too");
   EXPECT_EQ(entries(file("work")), std::vector<std::string>{"out"});
-  EXPECT_EQ(entries(out()).size(), 7u);
+  EXPECT_EQ(entries(out()).size(), 8u);
 }
 
 }  // namespace

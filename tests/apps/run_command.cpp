@@ -91,6 +91,20 @@ CommandResult run_command(const std::string& program, const std::vector<std::str
   return RunningCommand(words, options).wait();
 }
 
+std::vector<std::string> on_two_ranks(std::vector<std::string> command) {
+#ifdef DOFUSION_MPIRUN
+  command[0] = std::string(DOFUSION_BIN_DIR) + "/" + command[0];
+  // What Open MPI leaves behind at its end is not the sanitizers' business here.
+  std::vector<std::string> all = {
+      DOFUSION_MPIRUN, "--allow-run-as-root", "--oversubscribe", "-x", "ASAN_OPTIONS=detect_leaks=0", "-n", "2"};
+  all.insert(all.end(), command.begin(), command.end());
+  return all;
+#else
+  command.clear();
+  return command;
+#endif
+}
+
 void expect_refusal(const CommandResult& result, const std::vector<std::string>& words) {
   EXPECT_EQ(result.status, 2) << result.err;
   EXPECT_EQ(result.out, "");

@@ -47,6 +47,9 @@ class RunningCommand {
 CommandResult run_command(const std::string& program, const std::vector<std::string>& arguments,
                           const CommandOptions& options = {});
 
+// The same command on two ranks: what to give RunningCommand. Empty if the build is without MPI or mpirun is missing.
+std::vector<std::string> on_two_ranks(std::vector<std::string> command);
+
 // Bad input: exit status 2, nothing on stdout and one line on stderr that holds every one of `words`.
 void expect_refusal(const CommandResult& result, const std::vector<std::string>& words);
 

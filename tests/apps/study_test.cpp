@@ -81,20 +81,38 @@ std::string error_of(const std::string& json) {
 TEST(StudyConfig, DefaultsAndOwnValues) {
   const StudyConfig plain = study_config_from_json("{}", "study.json");
   EXPECT_EQ(plain.noise_scales, (std::vector<double>{0, 1, 2, 4}));
-  EXPECT_TRUE(plain.known);
+  ASSERT_EQ(plain.series.size(), 1u);
+  EXPECT_TRUE(plain.base().known);
   ASSERT_EQ(plain.tasks.size(), 2u);
 
   const StudyConfig own = study_config_from_json(
       R"({"sensor": "kinect2", "noise_scales": [0.5, 3], "distance_m": 1, "known": false, "samples": 16, "steps": 20,
           "tasks": [{"task": "stack", "objects": 3}], "model": "m.safetensors"})",
       "study.json");
-  EXPECT_EQ(own.sensor, SensorModel::kKinect2);
+  EXPECT_EQ(own.base().sensor, SensorModel::kKinect2);
   EXPECT_EQ(own.noise_scales, (std::vector<double>{0.5, 3}));
-  EXPECT_EQ(own.distance_m, 1.0);
-  EXPECT_FALSE(own.known);
+  EXPECT_EQ(own.base().distance_m, 1.0);
+  EXPECT_FALSE(own.base().known);
   EXPECT_EQ(own.tasks.at(0).task, Task::kStack);
   EXPECT_EQ(own.tasks.at(0).objects, 3);
-  EXPECT_EQ(own.model, "m.safetensors");
+  EXPECT_EQ(own.base().model, "m.safetensors");
+}
+
+TEST(StudyConfig, ASeriesSaysWhatDiffersFromTheFirst) {
+  const StudyConfig config = study_config_from_json(
+      R"({"sensor": "kinect", "distance_m": 1, "noise_scales": [0, 1],
+          "series": [{"known": false}, {"sensor": "azure", "distance_m": 0.5}]})",
+      "study.json");
+  ASSERT_EQ(config.series.size(), 3u);
+  EXPECT_EQ(config.trials_per_scene(), 6);
+  EXPECT_EQ(config.series[1].sensor, SensorModel::kKinect);
+  EXPECT_EQ(config.series[1].distance_m, 1.0);
+  EXPECT_FALSE(config.series[1].known);
+  EXPECT_EQ(config.series[2].sensor, SensorModel::kAzure);
+  EXPECT_TRUE(config.series[2].known);
+  EXPECT_EQ(series_title(config, 0), "known objects, the first Kinect, at 1 m");
+  EXPECT_EQ(series_title(config, 1), "unknown objects");
+  EXPECT_EQ(series_title(config, 2), "the Azure Kinect, at 0.5 m");
 }
 
 TEST(StudyConfig, ErrorsNameFileAndField) {
@@ -113,6 +131,11 @@ TEST(StudyConfig, ErrorsNameFileAndField) {
       {R"({"samples": 0})", "samples"},
       {R"({"steps": 1.5})", "steps"},
       {R"({"model": ""})", "model"},
+      {R"({"series": {}})", "series"},
+      {R"({"series": [{}]})", "series[0]"},
+      {R"({"series": [{"known": false}, {"known": false}]})", "series[1]"},
+      {R"({"series": [{"sensor": "eye"}]})", "series[0].sensor"},
+      {R"({"series": [{"steps": 3}]})", "series[0].steps"},
       {R"({"tasks": []})", "tasks"},
       {R"({"tasks": [{"objects": 2}]})", "tasks[0].task"},
       {R"({"tasks": [{"task": "single"}, {"task": "heap", "objects": 2}]})", "tasks[1].task"},
@@ -127,7 +150,7 @@ TEST(StudyConfig, ErrorsNameFileAndField) {
 TEST(StudyConfig, ModelIsRelativeToTheFile) {
   const TemporaryDirectory directory;
   write_file(directory / "study.json", R"({"model": "models/mine.safetensors"})");
-  EXPECT_EQ(read_study_config(directory / "study.json").model, directory / "models/mine.safetensors");
+  EXPECT_EQ(read_study_config(directory / "study.json").base().model, directory / "models/mine.safetensors");
   EXPECT_THROW(read_study_config(directory / "none.json"), InputError);
 }
 
@@ -212,9 +235,9 @@ TEST(StudySummary, IsWhatAHandWorksOut) {
   const StudySummary summary = summarise(four_rows(), config, 0);
   EXPECT_EQ(summary.trials, 4);
   EXPECT_EQ(summary.scenes, 2);
-  ASSERT_EQ(summary.points.size(), 2u);  // nothing was tried at 2
+  ASSERT_EQ(summary.base().size(), 2u);  // nothing was tried at 2
 
-  const StudyPoint& exact = summary.points[0];
+  const StudyPoint& exact = summary.base()[0];
   EXPECT_EQ(exact.trials, 2);
   EXPECT_DOUBLE_EQ(exact.medians.at("displacement_true_pct").value, 2.0);  // of 1 and 3
   EXPECT_GE(exact.medians.at("displacement_true_pct").interval.low, 1.0);
@@ -222,7 +245,7 @@ TEST(StudySummary, IsWhatAHandWorksOut) {
   EXPECT_DOUBLE_EQ(exact.shares.at("stable_true").value, 1.0);
   EXPECT_EQ(exact.depth_sigma_mm, 0.0);
 
-  const StudyPoint& noisy = summary.points[1];
+  const StudyPoint& noisy = summary.base()[1];
   EXPECT_DOUBLE_EQ(noisy.shares.at("stable_true").value, 0.5);
   EXPECT_DOUBLE_EQ(noisy.shares.at("objects_right").value, 0.5);
   EXPECT_DOUBLE_EQ(noisy.failures.at("table"), 0.5);
@@ -241,14 +264,32 @@ TEST(StudySummary, IsWhatAHandWorksOut) {
   EXPECT_DOUBLE_EQ(sum, 1.0);
 }
 
+TEST(StudySummary, SeriesAreApart) {
+  const StudyConfig config = study_config_from_json(
+      R"({"noise_scales": [0, 1], "series": [{"known": false}]})", "study.json");
+  std::vector<StudyRow> rows = four_rows();
+  for (StudyRow& row : rows) {
+    row.series = row.scene == 0 ? 0 : 1;
+    row.displacement_true_pct = row.series == 0 ? 1.0 : 50.0;
+  }
+  const StudySummary summary = summarise(rows, config, 0);
+  ASSERT_EQ(summary.series.size(), 2u);
+  EXPECT_EQ(summary.series[1].title, "unknown objects");
+  ASSERT_FALSE(summary.series[1].points.empty());
+  EXPECT_DOUBLE_EQ(summary.series[0].points[0].medians.at("displacement_true_pct").value, 1.0);
+  EXPECT_DOUBLE_EQ(summary.series[1].points[0].medians.at("displacement_true_pct").value, 50.0);
+  const std::string html = study_html(summary, config, 0);
+  EXPECT_THAT(html, AllOf(HasSubstr("side by side"), HasSubstr("Series: unknown objects")));
+}
+
 TEST(StudyReport, HasNoNumberWhereThereIsNone) {
   StudyConfig config;
   config.noise_scales = {0.0, 1.0};
   const StudySummary summary = summarise(four_rows(), config, 0);
   const nlohmann::ordered_json json = to_json(summary, R"({"format": "dofusion-study", "seed": 0})");
   EXPECT_EQ(json["trials"], 4);
-  EXPECT_DOUBLE_EQ(json["noise"][0]["displacement_true_pct"]["median"].get<double>(), 2.0);
-  EXPECT_TRUE(json["noise"][1]["displacement_true_pct"]["median"].is_null());
+  EXPECT_DOUBLE_EQ(json["series"][0]["noise"][0]["displacement_true_pct"]["median"].get<double>(), 2.0);
+  EXPECT_TRUE(json["series"][0]["noise"][1]["displacement_true_pct"]["median"].is_null());
 
   const std::string svg = displacement_svg(summary, config);
   EXPECT_THAT(svg, AllOf(HasSubstr("<svg"), HasSubstr("random placement"), HasSubstr("</svg>")));
@@ -276,15 +317,16 @@ std::string without_times(std::string csv_line) {
 TEST(Study, IsTheSameResumedAndOnTwoThreads) {
   if (!std::filesystem::exists(test_model())) GTEST_SKIP() << "no model at " << test_model();
   const TemporaryDirectory directory;
+  Ranks ranks;
   StudyJob job;
-  job.config.model = test_model();
+  job.config.series[0].model = test_model();
   job.config.noise_scales = {0.0, 2.0};
   job.config.samples = 2;
   job.config.steps = 10;
   job.trials = 4;
   job.seed = 5;
   job.partial = directory / "whole.csv";
-  const std::vector<StudyRow> whole = run_study(job);
+  const std::vector<StudyRow> whole = run_study(ranks, job);
   ASSERT_EQ(whole.size(), 4u);
   for (std::size_t i = 0; i < whole.size(); ++i) {
     EXPECT_EQ(whole[i].trial, static_cast<std::int64_t>(i));
@@ -302,15 +344,42 @@ TEST(Study, IsTheSameResumedAndOnTwoThreads) {
   job.threads = 2;
   const std::string text = read_file(directory / "whole.csv");
   write_file(job.partial, text.substr(0, text.size() - 30));
-  const std::vector<StudyRow> resumed = run_study(job);
+  const std::vector<StudyRow> resumed = run_study(ranks, job);
   ASSERT_EQ(resumed.size(), whole.size());
   for (std::size_t i = 0; i < whole.size(); ++i) {
     EXPECT_EQ(without_times(to_csv_line(resumed[i])), without_times(to_csv_line(whole[i])));
   }
   job.partial = directory / "threads.csv";
-  const std::vector<StudyRow> threaded = run_study(job);
+  const std::vector<StudyRow> threaded = run_study(ranks, job);
   for (std::size_t i = 0; i < whole.size(); ++i) {
     EXPECT_EQ(without_times(to_csv_line(threaded[i])), without_times(to_csv_line(whole[i])));
+  }
+}
+
+TEST(Study, SeriesShareScenesAndReferences) {
+  if (!std::filesystem::exists(test_model())) GTEST_SKIP() << "no model at " << test_model();
+  const TemporaryDirectory directory;
+  Ranks ranks;
+  StudyJob job;
+  job.config.series[0].model = test_model();
+  job.config.series.push_back(job.config.series[0]);
+  job.config.series[1].known = false;
+  job.config.noise_scales = {1.0};
+  job.config.samples = 2;
+  job.config.steps = 10;
+  job.trials = 4;
+  job.seed = 6;
+  job.threads = 2;
+  job.partial = directory / "series.csv";
+  const std::vector<StudyRow> rows = run_study(ranks, job);
+  ASSERT_EQ(rows.size(), 4u);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    EXPECT_EQ(rows[i].scene, static_cast<std::int64_t>(i / 2));
+    EXPECT_EQ(rows[i].series, static_cast<int>(i % 2));
+    EXPECT_EQ(rows[i].known, i % 2 == 0);
+    EXPECT_EQ(rows[i].context, rows[i / 2 * 2].context);
+    EXPECT_EQ(rows[i].displacement_ground_truth_pct, rows[i / 2 * 2].displacement_ground_truth_pct);
+    EXPECT_EQ(rows[i].fewest_pixels, rows[i / 2 * 2].fewest_pixels);  // from the same place
   }
 }
 

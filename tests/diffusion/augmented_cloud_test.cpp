@@ -149,7 +149,7 @@ TEST(CloudShape, DrawsUniformlyOverTheSurface) {
   const int count = 20000;
   std::vector<float> x(count), y(count), z(count), nx(count), ny(count), nz(count);
   Rng rng = make_rng(6);
-  plank.sample(count, rng, {x.data(), y.data(), z.data()}, {nx.data(), ny.data(), nz.data()});
+  plank.sample(count, 0.0, rng, {x.data(), y.data(), z.data()}, {nx.data(), ny.data(), nz.data()});
   int on_large_faces = 0;
   double sum_x = 0.0;
   for (int i = 0; i < count; ++i) {
@@ -162,6 +162,29 @@ TEST(CloudShape, DrawsUniformlyOverTheSurface) {
   const double area = 2 * (0.2 * 0.1 + 0.2 * 0.02 + 0.1 * 0.02);
   EXPECT_NEAR(on_large_faces / double(count), 2 * 0.2 * 0.1 / area, 0.015);  // five standard errors
   EXPECT_NEAR(sum_x / count, 0.0, 0.0025);
+}
+
+TEST(CloudShape, PutsAShareOnCornersAndEdges) {
+  const CloudShape plank(*make_box("plank", {0.2, 0.1, 0.02}));
+  const int count = 4000, on_edges = 1000;
+  std::vector<float> x(count), y(count), z(count), nx(count), ny(count), nz(count);
+  Rng rng = make_rng(7);
+  plank.sample(count, 0.25, rng, {x.data(), y.data(), z.data()}, {nx.data(), ny.data(), nz.data()});
+  int along_x = 0;
+  for (int i = 0; i < count; ++i) {
+    const bool ends[3] = {std::abs(std::abs(x[i]) - 0.1f) < 1e-7f, std::abs(std::abs(y[i]) - 0.05f) < 1e-7f,
+                          std::abs(std::abs(z[i]) - 0.01f) < 1e-7f};
+    const int at = ends[0] + ends[1] + ends[2];
+    EXPECT_EQ(at == 3, i < 8);  // each corner once
+    EXPECT_EQ(at >= 2, i < on_edges);
+    EXPECT_EQ(nx[i] == 0.0f && ny[i] == 0.0f && nz[i] == 0.0f, i < on_edges);
+    along_x += i >= 8 && i < on_edges && !ends[0];
+  }
+  EXPECT_NEAR(along_x / 992.0, 0.2 / 0.32, 0.08);  // five standard errors
+
+  const CloudShape ball(*make_sphere("ball", 0.05));
+  ball.sample(count, 0.25, rng, {x.data(), y.data(), z.data()}, {nx.data(), ny.data(), nz.data()});
+  EXPECT_GT(std::abs(nx[0]) + std::abs(ny[0]) + std::abs(nz[0]), 0.9f);  // it has no edges: all on its surface
 }
 
 }  // namespace

@@ -232,6 +232,41 @@ TEST_F(TrainerTest, TargetsAreTheNearestOfEqualPoses) {
   }
 }
 
+TEST_F(TrainerTest, OfAStackTheTopIsTheQueryAndElseAnyObject) {
+  ModelConfig config = small_config();
+  config.sigma_min = 1e-4;
+  config.sigma_max = 2e-4;
+  SceneDataset scenes = stacked_cubes(20, 1);
+  for (const bool stacks : {true, false}) {
+    for (SceneRecord& record : scenes.scenes) record.task = stacks ? Task::kStack : Task::kUnstructured;
+    const TrainingSet data({scenes}, config);
+    int tops = 0;
+    for (std::uint64_t i = 0; i < 100; ++i) {
+      NetworkInput input;
+      std::vector<float> target;
+      data.append(1, i, input, target);
+      tops += input.pose.back() > 1.0f;  // the height in cube edges: 0.5 or 1.5
+    }
+    EXPECT_NEAR(tops, stacks ? 100 : 50, stacks ? 0 : 25);  // five standard errors
+  }
+}
+
+TEST_F(TrainerTest, ScenesOfMoreObjectsAreDrawnMoreOften) {
+  ModelConfig config = small_config();
+  config.sigma_min = 1e-4;
+  config.sigma_max = 2e-4;
+  const TrainingSet data({boxes_on_table(500, 1), stacked_cubes(3, 1)}, config);  // of one and of two objects
+  constexpr int kDraws = 900;
+  int two = 0;
+  for (std::uint64_t i = 0; i < kDraws; ++i) {
+    NetworkInput input;
+    std::vector<float> target;
+    data.append(1, i, input, target);
+    two += input.pose.back() > 1.0f;  // the top of a stack
+  }
+  EXPECT_NEAR(two / double(kDraws), 2.0 / 3.0, 0.08);  // five standard errors
+}
+
 TEST_F(TrainerTest, BadDataIsRefused) {
   EXPECT_THROW(TrainingSet({}, small_config()), InputError);
   EXPECT_THROW(TrainingSet({boxes_on_table(0, 1)}, small_config()), InputError);

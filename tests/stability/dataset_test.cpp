@@ -150,8 +150,11 @@ TEST(Dataset, FiltersTakeScenesThatMeetEveryCondition) {
   DatasetFilter filter;
   filter.split = Split::kTest;
   expect(filter, [](const SceneRecord& s) { return s.split == Split::kTest; });
-  filter.task = Task::kStack;
+  filter.tasks = {Task::kStack};
   expect(filter, [](const SceneRecord& s) { return s.split == Split::kTest && s.task == Task::kStack; });
+  filter = {};
+  filter.tasks = {Task::kSingle, Task::kStack};
+  expect(filter, [](const SceneRecord& s) { return s.task != Task::kUnstructured; });
   filter = {};
   filter.objects = 2;
   expect(filter, [](const SceneRecord& s) { return s.objects.size() == 2; });

@@ -44,6 +44,21 @@ TEST(Simulator, ATiltedBoxFallsAndATowerOfTwoStands) {
   EXPECT_EQ(standing.touching, expected);
 }
 
+TEST(Simulator, RecordingAMotionChangesNothing) {
+  const Simulator simulator({make_block("cube"), make_block("hat")});
+  const std::vector<Pose> start = {make_pose(so3_exp({0.4, 0.1, 0}), {0, 0, 0.05}), at(0.03, 0, 0.12)};  // falls and tumbles
+  std::vector<std::vector<Pose>> frames;
+  const SettleResult recorded = simulator.settle(start, 25.0, &frames), plain = simulator.settle(start);
+  ASSERT_EQ(recorded.status, SettleStatus::kSettled);
+  EXPECT_EQ(recorded.seconds, plain.seconds);
+  // One at 0 s, one in every 0.04 s begun since, and the end.
+  EXPECT_NEAR(static_cast<double>(frames.size()), recorded.seconds * 25.0 + 1.5, 1.0);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_TRUE(frames.front()[i].isApprox(start[i], 1e-12));
+    EXPECT_EQ(frames.back()[i].matrix(), plain.T_world_object[i].matrix());
+  }
+}
+
 TEST(Simulator, ASettledSceneStays) {
   // Measured over 1,000 scenes (physics_study): 99th percentile 0.04 % or degrees.
   const std::vector<ObjectPtr> objects = {make_block("tall_triangle"), make_block("hat"), make_block("tetrahedron")};
