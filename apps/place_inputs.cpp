@@ -125,7 +125,8 @@ void check_inputs_survive(const PlaceArguments& arguments, const std::string& di
                                      arguments.query, arguments.objects, arguments.model, arguments.refine};
   for (const PlaceView& view : arguments.views) inputs.insert(inputs.end(), {view.depth, view.camera, view.pose});
   for (const std::string& input : inputs) {
-    for (const char* output : {"placements.json", "segmentation.png", "query.obj", "scene.xml", "scene.glb", "report.html", "objects"}) {
+    for (const char* output : {"placements.json", "segmentation.png", "query.obj", "scene.xml", "scene.glb",
+                               "report.html", "objects"}) {
       std::error_code error;
       if (input.empty() || !fs::equivalent(input, fs::path(directory) / output, error)) continue;
       throw InputError(input + ": --out " + directory + " would write over it; choose another folder");
