@@ -43,8 +43,8 @@ int main(int argc, char** argv) {
   app.add_option("--keyframe", job.mjcf.keyframe, "name or number of the MuJoCo file's keyframe to start from")
       ->needs(mjcf);
   app.add_flag("--settle", job.mjcf.settle, "let the MuJoCo scene come to rest first")->needs(mjcf);
-  auto* camera =
-      app.add_option("--camera", job.mjcf.camera, "look from this camera of the MuJoCo file, or from all")->needs(mjcf);
+  auto* camera = app.add_option("--camera", job.mjcf.cameras, "look from these cameras of the MuJoCo file, or from all")
+                     ->needs(mjcf);
   app.add_option("--task", task, "or new scenes: single, unstructured or stack")
       ->capture_default_str()
       ->excludes(data)
@@ -68,9 +68,11 @@ int main(int argc, char** argv) {
   app.add_option("--noise-scale", job.view.noise_scale, "multiplies the sensor's noise")
       ->check(CLI::Range(0.0, 100.0))
       ->capture_default_str();
-  app.add_option("--distance", job.view.viewpoint.distance, "from the camera to the scene's centre, metres")
-      ->check(CLI::Range(0.05, 10.0))
-      ->capture_default_str();
+  app.add_option("--distance", job.distance,
+                 "from the camera to the objects' centre, metres; default: 0.7, or what the size of the MuJoCo scene's "
+                 "objects asks for")
+      ->check(CLI::Range(0.05, 1000.0))
+      ->excludes(camera);
   app.add_option("--size", size, "width and height in pixels; the field of view stays")
       ->expected(2)
       ->check(CLI::Range(16, 8192))

@@ -37,6 +37,7 @@ ordered_json settings_of(const ScanJob& job, const GenerationOptions& generation
                                {"sensor", to_string(job.view.sensor)},
                                {"noise_scale", job.view.noise_scale},
                                {"distance", job.view.viewpoint.distance},
+                               {"depth_scale", job.camera.depth_scale},
                                {"size", {job.camera.width, job.camera.height}},
                                {"focal_length", {job.camera.fx, job.camera.fy}},
                                {"split", job.split},
@@ -69,7 +70,7 @@ SceneFolders folders_of(const ScanFolder& folder, const ScanJob& job, std::int64
 // What a thread keeps of the scene that it is at.
 struct SceneAtHand {
   std::int64_t number = -1;
-  std::unique_ptr<Scanner> scanner;
+  std::unique_ptr<SceneScanner> scanner;
   std::unique_ptr<BopSceneWriter> writer;
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
 };
@@ -125,52 +126,33 @@ class Scans {
   void take_up(std::int64_t number, SceneAtHand& hand) const {
     const auto k = static_cast<std::size_t>(number);
     const Scene& scene = scenes_.scenes[k];
-    Scene everything = scene;
-    if (scenes_.surroundings) {
-      everything.objects.push_back(scenes_.surroundings);
-      everything.T_world_object.push_back(Pose::Identity());
-    }
-    ScannerOptions options;
-    options.table = scenes_.table;
-    hand.scanner = std::make_unique<Scanner>(everything.objects, options);
-    hand.scanner->set_poses(everything.T_world_object);
-    hand.writer =
-        std::make_unique<BopSceneWriter>(scene, scenes_.ids[k], folders_of(folder_, job_, number).work, job_.clouds);
+    hand.writer.reset();  // stands on the scanner
+    hand.scanner = scenes_.geoms ? make_scene_scanner(*scenes_.geoms) : make_scene_scanner(scene);
+    hand.writer = std::make_unique<BopSceneWriter>(scene, *hand.scanner, scenes_.ids[k],
+                                                   folders_of(folder_, job_, number).work, job_.clouds);
     hand.centre = scene_centre(scene);
     hand.number = number;
   }
 
   ScanView view_of(int image, const SceneAtHand& hand, Rng& rng) const {
     if (!scenes_.views.empty()) return scenes_.views[static_cast<std::size_t>(image)];
-    return {job_.camera, sample_viewpoint(hand.centre, job_.view.viewpoint, rng)};
-  }
-
-  bool is_behind_a_plane(const ScanView& view) const {
-    const Eigen::Vector3d eye = view.T_world_camera.translation();
-    return std::any_of(scenes_.T_world_plane.begin(), scenes_.T_world_plane.end(),
-                       [&](const Pose& T_world_plane) { return !((T_world_plane.inverse() * eye).z() > 0.0); });
+    return {"", job_.camera, sample_viewpoint(hand.centre, job_.view.viewpoint, rng)};
   }
 
   void scan(std::int64_t number, int image, SceneAtHand& hand) const {
-    const auto k = static_cast<std::size_t>(number);
-    const Scene& scene = scenes_.scenes[k];
     if (hand.number != number) take_up(number, hand);
     Rng rng = make_rng(job_.seed ^ kViewSeed, static_cast<std::uint64_t>(number * cameras_ + image));
     const ScanView from = view_of(image, hand, rng);
-    std::string problem = viewpoint_problem(scene, from.T_world_camera, scenes_.table);
-    if (is_behind_a_plane(from)) problem = "the camera is behind a plane";
+    const std::string problem = hand.scanner->viewpoint_problem(from.T_world_camera);
     if (!problem.empty()) {
-      throw UnusableScene("image " + std::to_string(image) + ": " + problem +
-                          (scenes_.views.empty() ? "; choose another --distance or --seed" : ""));
+      throw UnusableScene("image " + std::to_string(image) + (from.name.empty() ? "" : " (" + from.name + ")") + ": " +
+                          problem + "; choose " +
+                          (scenes_.views.empty() ? "another --distance or --seed" : "others with --camera"));
     }
-    SyntheticView view = make_synthetic_view(*hand.scanner, from.camera, from.T_world_camera, job_.view, rng);
-    // What the scanner has after the scene's objects is the surroundings: for the dataset, as the table.
-    for (std::uint8_t& label : view.truth.labels.pixels) {
-      if (label >= kLabelFirstObject + scene.objects.size()) label = kLabelTable;
-    }
-    hand.writer->add(image, from.camera, view,
-                     job_.fine_rgb ? shaded_picture(*hand.scanner, from.camera, from.T_world_camera)
-                                   : quick_picture(view.truth, from.T_world_camera));
+    Shot shot = hand.scanner->shoot(from.camera, from.T_world_camera, job_.fine_rgb);
+    const SyntheticView view =
+        make_synthetic_view(std::move(shot.scan), from.camera, from.T_world_camera, job_.view, rng);
+    hand.writer->add(image, from.camera, view, shot.picture);
   }
 
   void finish(std::int64_t scene) const {
@@ -212,6 +194,28 @@ void write_models(const ScanScenes& scenes, const ScanJob& job, const ScanFolder
                    job.threads);
 }
 
+// Steps of depth that leave room for what lies behind the objects: 65535 of them is all an image holds.
+double depth_step_mm(double distance) {
+  constexpr double kFine = 0.1, kRoom = 2.0;
+  double step = kFine;
+  while (65.535 * step < kRoom * distance) step *= 10.0;
+  return step;
+}
+
+// The job with what its scenes decide: how far away cameras look from, and in which steps of depth.
+ScanJob fitted(ScanJob job, ScanScenes& scenes) {
+  if (job.distance == 0.0) {
+    job.distance = scenes.geoms ? viewing_distance(scenes.scenes.front(), job.camera) : job.view.viewpoint.distance;
+  }
+  job.view.viewpoint.distance = job.distance;
+  job.camera.depth_scale = depth_step_mm(job.distance);
+  for (ScanView& view : scenes.views) {
+    const Eigen::Vector3d eye = view.T_world_camera.translation();
+    view.camera.depth_scale = depth_step_mm((eye - scene_centre(scenes.scenes.front())).norm());
+  }
+  return job;
+}
+
 ScanResult scan_all(const ScanJob& job, const ScanScenes& scenes, const ScanFolder& folder) {
   write_models(scenes, job, folder);
   Scans scans(job, scenes, folder);
@@ -238,14 +242,18 @@ ScanResult scan_all(const ScanJob& job, const ScanScenes& scenes, const ScanFold
 
 }  // namespace
 
-ScanResult scan_scenes(const ScanJob& job) {
-  GenerationOptions generation = job.generation;
-  generation.seed = job.seed;
-  const std::int64_t fresh = job.count > 0 ? job.count : 10;
+ScanResult scan_scenes(const ScanJob& wanted) {
+  GenerationOptions generation = wanted.generation;
+  generation.seed = wanted.seed;
+  const std::int64_t fresh = wanted.count > 0 ? wanted.count : 10;
   ScanScenes scenes;
+  if (!is_new(wanted)) {
+    scenes =
+        wanted.data.empty() ? scan_scenes_of_mjcf(wanted.mjcf, wanted.camera) : scan_scenes_of(read_scenes(wanted));
+  }
+  const ScanJob job = fitted(wanted, scenes);
   ordered_json settings = settings_of(job, generation, fresh);
   if (!is_new(job)) {
-    scenes = job.data.empty() ? scan_scenes_of_mjcf(job.mjcf, job.camera) : scan_scenes_of(read_scenes(job));
     settings["count"] = scenes.scenes.size();
     settings["scenes"] = fingerprint(scenes);
   }
@@ -255,7 +263,8 @@ ScanResult scan_scenes(const ScanJob& job) {
     if (is_new(job)) {
       scenes = scan_scenes_of(generate_scenes(generation, fresh, job.threads, folder.path() / kJournal));
     }
-    const ScanResult result = scan_all(job, scenes, folder);
+    ScanResult result = scan_all(job, scenes, folder);
+    if (scenes.views.empty()) result.distance = job.distance;
     std::error_code ignored;
     fs::remove(folder.path() / kJournal, ignored);
     folder.commit();
@@ -276,6 +285,7 @@ ordered_json to_json(const ScanJob& job, const ScanResult& result) {
           {"noise_scale", job.view.noise_scale},
           {"seed", job.seed},
           {"threads", job.threads},
+          {"distance", result.distance},
           {"resumed", result.resumed},
           {"seconds", result.seconds},
           {"images_per_second", result.images_per_second},

@@ -21,6 +21,8 @@ struct ScanJob {
   int cameras = 1;               // viewpoints a scene, unless the MJCF file's are used
   Camera camera = default_camera();
   SyntheticViewOptions view;
+  double distance = 0.0;  // metres from sampled viewpoints to the objects' centre; 0: 0.7, or as far as the size of an
+                          // MJCF scene's objects asks for (viewing_distance)
   bool fine_rgb = false;  // colour pictures with soft shadows
   bool clouds = false;    // PCD files as well
   std::string split = "test";
@@ -35,12 +37,14 @@ struct ScanResult {
   double seconds = 0.0;            // of scanning: reading, generation and models come before
   double images_per_second = 0.0;  // of this run
   double processor_ms_per_image = 0.0;
+  double distance = 0.0;  // metres, as the job says or as was chosen; 0: the MJCF file's cameras were used
 };
 
 // Works in OUT.partial (apps/scan_folder.h), which becomes OUT when everything is there; the bytes of OUT depend on the
-// job alone, not on threads and kills. Throws InputError on bad input, naming the scene if one cannot be scanned: more
-// than 253 objects, a camera under the table or inside an object, an object outside all images; OUT.partial is then
-// deleted, since the same job cannot succeed. Throws Interrupted if the user ends the program; OUT.partial stays.
+// job alone, not on threads and kills. Depth is written in steps of 0.1 mm, and of 1 or 10 mm where the objects are
+// more than 3.2 or 32 m away. Throws InputError on bad input, naming the scene if one cannot be scanned: more than 253
+// objects, a camera under the table, behind a plane or inside something, an object outside all images; OUT.partial is
+// then deleted, since the same job cannot succeed. Throws Interrupted if the user ends the program; OUT.partial stays.
 ScanResult scan_scenes(const ScanJob& job);
 
 nlohmann::ordered_json to_json(const ScanJob& job, const ScanResult& result);  // for --json

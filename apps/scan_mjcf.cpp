@@ -1,7 +1,9 @@
 #include "apps/scan_mjcf.h"
 
 #include <algorithm>
+#include <set>
 
+#include "apps/program.h"
 #include "stability/files.h"
 #include "stability/geom_mesh.h"
 #include "stability/mjcf_scene.h"
@@ -10,7 +12,6 @@ namespace dofusion {
 namespace {
 
 constexpr int kShownGroups = 3;  // as MuJoCo's viewers start
-const char* const kSurroundings = "surroundings";
 
 bool is_shown(const Geom& geom) { return geom.group < kShownGroups && geom.rgba[3] > 0.0f; }
 
@@ -35,7 +36,8 @@ bool equal_shapes(const TriangleMesh& a, const TriangleMesh& b) {
 
 std::vector<Pose> poses_of(const MjcfScene& file, const MjcfScanOptions& options) {
   if (!options.settle) return file.initial_poses();
-  const SettleResult result = file.settle();
+  const SettleResult result = file.settle({}, interrupted);
+  if (interrupted()) throw Interrupted("interrupted while the scene settled");
   if (result.status == SettleStatus::kDiverged) throw InputError(options.file + ": the simulation diverges");
   return file.poses(result.T_world_object);
 }
@@ -47,18 +49,22 @@ Camera image_of(const SceneCamera& from, const Camera& wanted) {
   return camera;
 }
 
+// In the file's order.
 std::vector<ScanView> views_of(const MjcfScene& file, const MjcfScanOptions& options, const std::vector<Pose>& poses,
                                const Camera& camera) {
   std::vector<ScanView> views;
-  if (options.camera.empty()) return views;
+  if (options.cameras.empty()) return views;
   std::string known;
+  std::set<std::string> wanted(options.cameras.begin(), options.cameras.end());
+  const bool all = wanted.erase("all") > 0;
   for (const SceneCamera& each : file.cameras()) {
     known += (known.empty() ? "" : ", ") + (each.name.empty() ? "one without a name" : each.name);
-    if (options.camera != "all" && options.camera != each.name) continue;
-    views.push_back({image_of(each, camera), camera_pose(each, poses)});
+    if (wanted.erase(each.name) == 0 && !all) continue;
+    views.push_back({each.name, image_of(each, camera), camera_pose(each, poses)});
   }
   if (known.empty()) throw InputError(options.file + ": has no camera; leave --camera out to look from all around");
-  if (views.empty()) throw InputError("--camera: " + options.file + " has no '" + options.camera + "', but " + known);
+  if (!wanted.empty())
+    throw InputError("--camera: " + options.file + " has no '" + *wanted.begin() + "', but " + known);
   return views;
 }
 
@@ -66,23 +72,19 @@ std::vector<ScanView> views_of(const MjcfScene& file, const MjcfScanOptions& opt
 
 ScanScenes scan_scenes_of_mjcf(const MjcfScanOptions& options, const Camera& camera) {
   const MjcfScene file(options.file, options.keyframe);
-  const std::vector<Pose> poses = poses_of(file, options);
   const std::vector<SceneBody>& bodies = file.bodies();
+  GeomScene geoms;
+  geoms.T_world_body = poses_of(file, options);
+  geoms.object_of_body.assign(bodies.size(), -1);
+  for (const SceneBody& body : bodies) geoms.body_names.push_back(body.name);
   std::vector<TriangleMesh> meshes(bodies.size());  // of those that move, in their frames
-  TriangleMesh surroundings;
-  ScanScenes result;
   for (const Geom& geom : file.geoms()) {
     if (!is_shown(geom)) continue;
+    geoms.geoms.push_back(geom);
     const auto body = static_cast<std::size_t>(geom.body);
-    if (bodies[body].moves) {
-      append(tessellated(geom), geom.T_body_geom, meshes[body]);
-    } else {
-      append(tessellated(geom), poses[body] * geom.T_body_geom, surroundings);
-      if (geom.type == GeomType::kPlane) result.T_world_plane.push_back(poses[body] * geom.T_body_geom);
-    }
+    if (bodies[body].moves) append(tessellated(geom), geom.T_body_geom, meshes[body]);
   }
-  result.table = false;
-  if (!surroundings.triangles.empty()) result.surroundings = drawn_object(kSurroundings, std::move(surroundings));
+  ScanScenes result;
   Scene scene;
   std::vector<int> ids;
   for (std::size_t body = 0; body < bodies.size(); ++body) {
@@ -93,16 +95,18 @@ ScanScenes scan_scenes_of_mjcf(const MjcfScanOptions& options, const Camera& cam
       result.models.push_back(drawn_object(bodies[body].name, std::move(meshes[body])));
       model = result.models.end() - 1;
     }
+    geoms.object_of_body[body] = static_cast<int>(scene.objects.size());
     scene.objects.push_back(*model);
-    scene.T_world_object.push_back(poses[body]);
+    scene.T_world_object.push_back(geoms.T_world_body[body]);
     ids.push_back(static_cast<int>(model - result.models.begin()) + 1);
   }
   if (scene.objects.empty())
     throw InputError(options.file + ": nothing in it moves that can be seen; there is no object");
   check_number_of_objects(scene.objects.size(), options.file);
+  result.views = views_of(file, options, geoms.T_world_body, camera);
   result.scenes.push_back(std::move(scene));
   result.ids.push_back(std::move(ids));
-  result.views = views_of(file, options, poses, camera);
+  result.geoms = std::move(geoms);
   return result;
 }
 

@@ -36,6 +36,26 @@ class Fnv1a {
   std::uint64_t hash_ = 0xCBF29CE484222325u;
 };
 
+void add_pose(const Pose& pose, Fnv1a& hash) { hash.add(pose.matrix().data(), sizeof(double) * 16); }
+
+void add_mesh(const TriangleMesh& mesh, Fnv1a& hash) {
+  for (const Eigen::Vector3d& v : mesh.vertices) hash.add(v.data(), sizeof(double) * 3);
+  for (const Eigen::Vector3i& t : mesh.triangles) hash.add(t.data(), sizeof(int) * 3);
+}
+
+void add_geoms(const GeomScene& scene, Fnv1a& hash) {
+  for (const Geom& geom : scene.geoms) {
+    hash.add(&geom.type, sizeof geom.type);
+    hash.add(geom.size.data(), sizeof(double) * 3);
+    hash.add(&geom.body, sizeof geom.body);
+    hash.add(geom.rgba.data(), sizeof geom.rgba);
+    add_pose(geom.T_body_geom, hash);
+    if (geom.mesh) add_mesh(*geom.mesh, hash);
+    if (geom.height_field) add_mesh(height_field_mesh(*geom.height_field), hash);
+  }
+  for (const Pose& pose : scene.T_world_body) add_pose(pose, hash);
+}
+
 }  // namespace
 
 SceneDataset generate_scenes(const GenerationOptions& options, std::int64_t count, int threads,
@@ -104,20 +124,18 @@ ScanScenes scan_scenes_of(const SceneDataset& dataset) {
 
 std::string fingerprint(const ScanScenes& scenes) {
   Fnv1a hash;
-  const auto add_shape = [&](const Object& shape) {
-    hash.add(shape.name.data(), shape.name.size());
-    for (const Eigen::Vector3d& v : shape.mesh.vertices) hash.add(v.data(), sizeof(double) * 3);
-    for (const Eigen::Vector3i& t : shape.mesh.triangles) hash.add(t.data(), sizeof(int) * 3);
-  };
-  for (const ObjectPtr& model : scenes.models) add_shape(*model);
-  if (scenes.surroundings) add_shape(*scenes.surroundings);
+  for (const ObjectPtr& model : scenes.models) {
+    hash.add(model->name.data(), model->name.size());
+    add_mesh(model->mesh, hash);
+  }
+  if (scenes.geoms) add_geoms(*scenes.geoms, hash);
   for (std::size_t k = 0; k < scenes.scenes.size(); ++k) {
     hash.add(scenes.ids[k].data(), sizeof(int) * scenes.ids[k].size());
-    for (const Pose& pose : scenes.scenes[k].T_world_object) hash.add(pose.matrix().data(), sizeof(double) * 16);
+    for (const Pose& pose : scenes.scenes[k].T_world_object) add_pose(pose, hash);
   }
   for (const ScanView& view : scenes.views) {
     hash.add(&view.camera.fy, sizeof(double));
-    hash.add(view.T_world_camera.matrix().data(), sizeof(double) * 16);
+    add_pose(view.T_world_camera, hash);
   }
   return hash.hex();
 }

@@ -3,10 +3,12 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "perception/camera.h"
+#include "perception/scene_scanner.h"
 #include "stability/dataset.h"
 #include "stability/generation.h"
 
@@ -19,6 +21,7 @@ SceneDataset generate_scenes(const GenerationOptions& options, std::int64_t coun
 
 // Where an image is taken from.
 struct ScanView {
+  std::string name;  // the camera's in its file; may be empty
   Camera camera;
   Pose T_world_camera = Pose::Identity();
 };
@@ -28,10 +31,8 @@ struct ScanScenes {
   std::vector<ObjectPtr> models;
   std::vector<Scene> scenes;          // equal objects are one and the same
   std::vector<std::vector<int>> ids;  // per scene and object: index into models, plus 1
-  bool table = true;                  // the plane z = 0 is there
-  ObjectPtr surroundings;             // is there too, in the world's frame, and is no object; may be null
+  std::optional<GeomScene> geoms;     // what the one scene is made of; none: each is its objects on the table
   std::vector<ScanView> views;        // of every scene; empty: they are sampled
-  std::vector<Pose> T_world_plane;    // planes z = 0 of the surroundings that no camera may be behind
 };
 
 // Throws UnusableScene, naming the scene, if it has more than 253 objects, the most that labels of 8 bits tell apart.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "apps/program.h"
 #include "stability/dataset.h"
 #include "stability/files.h"
 #include "stability/mjcf.h"
@@ -108,7 +109,8 @@ SettleReport settle_mjcf(const SettleJob& job) {
   }
   PhysicsOptions options;
   options.time_limit = job.time_limit;
-  settled.result = file.settle(options);
+  settled.result = file.settle(options, interrupted);
+  if (interrupted()) throw Interrupted("interrupted");
   SettleReport report = report_of(job.mjcf, settled);
   if (as_objects) finish(job, file.to_scene(settled.result.T_world_object), query, report);
   return report;

@@ -71,7 +71,10 @@ PixelBox projected_box(const Object& object, const Pose& T_camera_object, const 
     box.add(static_cast<int>(std::floor(std::clamp(pixel.x(), -1.0 * camera.width, 2.0 * camera.width - 1))),
             static_cast<int>(std::floor(std::clamp(pixel.y(), -1.0 * camera.height, 2.0 * camera.height - 1))));
   }
-  ++box.u1, ++box.v1;
+  // Round shapes reach a little beyond their meshes.
+  const int more = 1 + (box.u1 - box.u0 + box.v1 - box.v0) / 200;
+  box.u0 = std::max(box.u0 - more, -camera.width), box.u1 = std::min(box.u1 + more, 2 * camera.width - 1);
+  box.v0 = std::max(box.v0 - more, -camera.height), box.v1 = std::min(box.v1 + more, 2 * camera.height - 1);
   return box;
 }
 
@@ -85,12 +88,6 @@ std::vector<LabelImage> visible_parts(const LabelImage& labels, std::size_t obje
   return parts;
 }
 
-ScannerOptions without_table() {
-  ScannerOptions options;
-  options.table = false;
-  return options;
-}
-
 }  // namespace
 
 std::string bop_scene_name(int scene) { return number_name(scene); }
@@ -100,7 +97,7 @@ struct BopSceneWriter::Impl {
   std::vector<int> model_ids;
   fs::path folder;
   bool clouds = false;
-  std::vector<Scanner> alone;  // per object, without anything that could hide it
+  const SceneScanner* scanner = nullptr;
 
   std::string file(const char* kind, const std::string& name) const {
     return (folder / kind / (name + ".png")).string();
@@ -109,20 +106,17 @@ struct BopSceneWriter::Impl {
                    const std::string& image);
 };
 
-BopSceneWriter::BopSceneWriter(const Scene& scene, const std::vector<int>& model_ids, const fs::path& folder,
-                               bool clouds)
+BopSceneWriter::BopSceneWriter(const Scene& scene, const SceneScanner& scanner, const std::vector<int>& model_ids,
+                               const fs::path& folder, bool clouds)
     : impl_(std::make_unique<Impl>()) {
   if (model_ids.size() != scene.objects.size())
     throw std::invalid_argument(std::to_string(model_ids.size()) + " model ids for " +
                                 std::to_string(scene.objects.size()) + " objects");
   impl_->scene = scene;
+  impl_->scanner = &scanner;
   impl_->model_ids = model_ids;
   impl_->folder = folder;
   impl_->clouds = clouds;
-  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
-    impl_->alone.emplace_back(std::vector<ObjectPtr>{scene.objects[i]}, without_table());
-    impl_->alone.back().set_poses({scene.T_world_object[i]});
-  }
   for (const char* kind : {"rgb", "depth", "mask", "mask_visib", kRecords}) make_folder(folder / kind);
   if (clouds) make_folder(folder / "pcd");
 }
@@ -162,17 +156,17 @@ Json BopSceneWriter::Impl::write_masks(int object, const Camera& camera, const S
   const auto i = static_cast<std::size_t>(object);
   const Pose T_camera_object = view.T_world_camera.inverse() * scene.T_world_object[i];
   const PixelBox window = projected_box(*scene.objects[i], T_camera_object, camera);
-  const Scan silhouette =
-      alone[i].render_window(camera, view.T_world_camera, window.u0, window.v0, window.u1 + 1, window.v1 + 1);
+  const LabelImage silhouette =
+      scanner->silhouette(object, camera, view.T_world_camera, {window.u0, window.v0, window.u1 + 1, window.v1 + 1});
   LabelImage mask(camera.width, camera.height);
   PixelBox box, visible_box;
   int all = 0, valid = 0, seen = 0, inside = 0;
-  for (int row = 0; row < silhouette.labels.height; ++row)
-    for (int column = 0; column < silhouette.labels.width; ++column) {
+  for (int row = 0; row < silhouette.height; ++row)
+    for (int column = 0; column < silhouette.width; ++column) {
       const int u = window.u0 + column, v = window.v0 + row;
       const bool in_image = mask.contains(v, u), is_seen = in_image && visible.at(v, u) != 0;
       // Rays that graze the outline may hit in one scan and miss in the other: what is seen is part of the silhouette.
-      if (silhouette.labels.at(row, column) == kLabelNothing && !is_seen) continue;
+      if (silhouette.at(row, column) == kLabelNothing && !is_seen) continue;
       ++all;
       box.add(u, v);
       if (!in_image) continue;

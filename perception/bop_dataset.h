@@ -19,6 +19,7 @@
 
 #include "perception/camera.h"
 #include "perception/picture.h"
+#include "perception/scene_scanner.h"
 #include "perception/synthetic_view.h"
 #include "stability/files.h"
 #include "stability/scene.h"
@@ -42,10 +43,11 @@ class UnusableScene : public InputError {
 // Writes the images of one scene. Several may write different images of one scene at once.
 class BopSceneWriter {
  public:
-  // `model_ids` are the objects' ids in the dataset, from 1. Makes the scene's folders, with those of clouds if
-  // `clouds`. Throws std::invalid_argument if the number of ids is wrong.
-  BopSceneWriter(const Scene& scene, const std::vector<int>& model_ids, const std::filesystem::path& folder,
-                 bool clouds = false);
+  // `scanner` is one of this scene, for silhouettes, and must outlive the writer. `model_ids` are the objects' ids in
+  // the dataset, from 1. Makes the scene's folders, with those of clouds if `clouds`. Throws std::invalid_argument if
+  // the number of ids is wrong.
+  BopSceneWriter(const Scene& scene, const SceneScanner& scanner, const std::vector<int>& model_ids,
+                 const std::filesystem::path& folder, bool clouds = false);
   ~BopSceneWriter();
 
   // Writes the files of image number `image`, and last of all its record, a file that finish_bop_scene uses.

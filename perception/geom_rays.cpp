@@ -1,5 +1,6 @@
 #include "perception/geom_rays.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -134,6 +135,28 @@ std::optional<RayHit> intersect(GeomType type, const Vector3d& size, const Vecto
       return std::nullopt;
   }
   return std::nullopt;
+}
+
+bool contains(GeomType type, const Vector3d& size, const Vector3d& point) {
+  switch (type) {
+    case GeomType::kSphere:
+      return point.norm() < size.x();
+    case GeomType::kCapsule: {
+      const Vector3d nearest(0.0, 0.0, std::clamp(point.z(), -size.y(), size.y()));  // of its straight part's axis
+      return (point - nearest).norm() < size.x();
+    }
+    case GeomType::kEllipsoid:
+      return point.cwiseQuotient(size).norm() < 1.0;
+    case GeomType::kCylinder:
+      return point.head<2>().norm() < size.x() && std::abs(point.z()) < size.y();
+    case GeomType::kBox:
+      return (point.cwiseAbs().array() < size.array()).all();
+    case GeomType::kPlane:
+    case GeomType::kHeightField:
+    case GeomType::kMesh:
+      return false;
+  }
+  return false;
 }
 
 }  // namespace dofusion

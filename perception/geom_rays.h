@@ -21,4 +21,8 @@ struct RayHit {
 std::optional<RayHit> intersect(GeomType type, const Eigen::Vector3d& size, const Eigen::Vector3d& origin,
                                 const Eigen::Vector3d& direction);
 
+// Whether a point in the geom's frame lies inside the geom, not on its surface. Nothing lies inside a plane; false for
+// meshes and height fields.
+bool contains(GeomType type, const Eigen::Vector3d& size, const Eigen::Vector3d& point);
+
 }  // namespace dofusion

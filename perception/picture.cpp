@@ -102,6 +102,14 @@ Rgb object_colour(int index) {
   return scaled_colour(colour, std::pow(0.8, static_cast<double>(index / static_cast<int>(kPalette.size()))));
 }
 
+Rgb drawn_rgb(const Geom& geom) {
+  Rgb rgb;
+  for (std::size_t k = 0; k < 3; ++k) {
+    rgb[k] = static_cast<std::uint8_t>(std::lround(255.0f * std::clamp(geom.rgba[k], 0.0f, 1.0f)));
+  }
+  return rgb;
+}
+
 ColourImage depth_picture(const DepthImage& depth) {
   ColourImage picture(depth.width, depth.height, kNoReading);
   std::vector<float> readings;

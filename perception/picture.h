@@ -17,6 +17,8 @@ using ColourImage = Image<Rgb>;
 
 // A colour per object, distinct for the first ten; the highlighted query has one of its own.
 Rgb object_colour(int index);
+// A geom's own, as bytes.
+Rgb drawn_rgb(const Geom& geom);
 inline constexpr Rgb kQueryColour{240, 120, 20};
 inline constexpr Rgb kTableColour{205, 205, 202};
 

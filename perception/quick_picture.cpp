@@ -35,26 +35,39 @@ Rgb lit(const Rgb& colour, double light) {
   return result;
 }
 
-}  // namespace
-
-ColourImage quick_picture(const Scan& scan, const Pose& T_world_camera) {
+// `things` says what is seen, `nothing` where there is none; own(thing) is a thing's colour in full light.
+template <class Thing, class Own>
+ColourImage lit_picture(const Image<Thing>& things, Thing nothing, const NormalImage& normals,
+                        const Pose& T_world_camera, const Own& own) {
   const Light light(T_world_camera);
-  ColourImage picture(scan.labels.width, scan.labels.height, kTableColour);
+  ColourImage picture(things.width, things.height, kTableColour);
   // Neighbours mostly lie on one face.
-  std::uint8_t label = kLabelNothing;
+  Thing thing = nothing;
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();
   Rgb colour = kTableColour;
   for (std::size_t i = 0; i < picture.pixels.size(); ++i) {
-    if (scan.labels.pixels[i] == kLabelNothing) continue;
-    if (scan.labels.pixels[i] != label || scan.normals.pixels[i] != normal) {
-      label = scan.labels.pixels[i];
-      normal = scan.normals.pixels[i];
-      const Rgb own = label == kLabelTable ? kTableColour : object_colour(label - kLabelFirstObject);
-      colour = lit(own, light.on(normal));
+    if (things.pixels[i] == nothing) continue;
+    if (things.pixels[i] != thing || normals.pixels[i] != normal) {
+      thing = things.pixels[i];
+      normal = normals.pixels[i];
+      colour = lit(own(thing), light.on(normal));
     }
     picture.pixels[i] = colour;
   }
   return picture;
+}
+
+}  // namespace
+
+ColourImage quick_picture(const Scan& scan, const Pose& T_world_camera) {
+  return lit_picture(scan.labels, kLabelNothing, scan.normals, T_world_camera, [](std::uint8_t label) {
+    return label == kLabelTable ? kTableColour : object_colour(label - kLabelFirstObject);
+  });
+}
+
+ColourImage quick_picture(const GeomScan& scan, const std::vector<Geom>& geoms, const Pose& T_world_camera) {
+  return lit_picture(scan.geoms, std::int32_t{-1}, scan.normals, T_world_camera,
+                     [&](std::int32_t geom) { return drawn_rgb(geoms[static_cast<std::size_t>(geom)]); });
 }
 
 }  // namespace dofusion

@@ -16,9 +16,8 @@ namespace {
 
 using Linear = Eigen::Vector3f;  // light, proportional to power
 
-constexpr int kSide = 2;                             // samples a pixel's side
-constexpr float kSurfaceOffset = 1e-4f;              // metres; where shadow rays begin, above what floats resolve
-constexpr float kFadeBegin = 0.5f, kFadeEnd = 1.6f;  // metres from the sight's centre; the table fades to the backdrop
+constexpr int kSide = 2;                 // samples a pixel's side
+constexpr float kSurfaceOffset = 1e-4f;  // metres; where shadow rays begin, above what floats resolve
 
 float linear_of(std::uint8_t value) { return std::pow(static_cast<float>(value) / 255.0f, 2.2f); }
 Linear linear_of(const Rgb& colour) { return {linear_of(colour[0]), linear_of(colour[1]), linear_of(colour[2])}; }
@@ -73,10 +72,12 @@ struct Paint {
 struct Sight {
   DepthImage depth;
   NormalImage normals;
-  IdImage things;             // -1 nothing
-  std::vector<Paint> paints;  // per thing
-  float scale = 1.0f;         // how large the scene is; 1 is a table top
-  std::function<std::vector<std::uint8_t>(const std::vector<Scanner::Segment>&)> occluded;
+  IdImage things;               // -1 nothing
+  std::vector<Paint> paints{};  // per thing
+  float scale = 1.0f;           // how large the scene is; 1 is a table top
+  // Where the ground begins to fade to the backdrop and where it has: metres from the sight's centre, times the scale.
+  float fade_begin = 0.5f, fade_end = 1.6f;
+  std::function<std::vector<std::uint8_t>(const std::vector<Scanner::Segment>&)> occluded{};
 };
 
 // Shades a sight row by row.
@@ -188,7 +189,9 @@ class Shader {
     const Linear colour = lit(paint.albedo, surface.normal, lamp, sky, to_viewer);
     if (paint.ground) {
       const float distance = (surface.point - centre_).head<2>().norm() / sight_.scale;
-      const float fade = std::clamp((distance - kFadeBegin) / (kFadeEnd - kFadeBegin), 0.0f, 1.0f);
+      const float share = (distance - sight_.fade_begin) / (sight_.fade_end - sight_.fade_begin);
+      const float t = std::clamp(share, 0.0f, 1.0f);
+      const float fade = t * t * (3.0f - 2.0f * t);  // without an edge where it begins
       return (1.0f - fade) * colour + fade * backdrop_;
     }
     return outlined(row, column, paint.outline) ? Linear(0.35f * colour) : colour;
@@ -220,7 +223,7 @@ class Shader {
 // Things are labels less one: the table, then the objects.
 Sight sight_of(const Scanner& scanner, const Camera& fine, const Pose& T_world_camera, const PictureOptions& options) {
   Scan scan = scanner.render(fine, T_world_camera);
-  Sight sight{std::move(scan.depth), std::move(scan.normals), IdImage(fine.width, fine.height), {}, 1.0f, {}};
+  Sight sight{std::move(scan.depth), std::move(scan.normals), IdImage(fine.width, fine.height)};
   std::transform(scan.labels.pixels.begin(), scan.labels.pixels.end(), sight.things.pixels.begin(),
                  [](std::uint8_t label) { return label - kLabelTable; });
   sight.paints.push_back({linear_of(kTableColour), true, 1});
@@ -236,19 +239,17 @@ Sight sight_of(const Scanner& scanner, const Camera& fine, const Pose& T_world_c
 Sight sight_of(const GeomScanner& scanner, const Camera& fine, const Pose& T_world_camera,
                const PictureOptions& options) {
   GeomScan scan = scanner.render(fine, T_world_camera);
-  Sight sight{std::move(scan.depth), std::move(scan.normals), std::move(scan.geoms), {}, 1.0f, {}};
+  Sight sight{std::move(scan.depth), std::move(scan.normals), std::move(scan.geoms)};
   for (const Geom& geom : scanner.geoms()) {
     const bool highlighted = geom.body == options.highlighted;
-    // Colours of files are as they are shown, like bytes.
-    const auto channel = [&](std::size_t k) {
-      return linear_of(static_cast<std::uint8_t>(std::lround(255.0f * std::clamp(geom.rgba[k], 0.0f, 1.0f))));
-    };
-    const Linear albedo = highlighted ? linear_of(kQueryColour) : Linear(channel(0), channel(1), channel(2));
+    const Linear albedo = linear_of(highlighted ? kQueryColour : drawn_rgb(geom));
     sight.paints.push_back({albedo, geom.type == GeomType::kPlane, highlighted ? 3 : 1});
   }
   // As large as what is in the middle of the picture is far, in table tops 0.7 m away.
   const float middle = sight.depth.at(fine.height / 2, fine.width / 2);
   if (middle > 0.0f) sight.scale = middle / 0.7f;
+  // A floor may be dark: it goes on to the horizon, where a bright rim would look like the edge of a disk.
+  sight.fade_begin = 2.0f, sight.fade_end = 12.0f;
   sight.occluded = [&scanner](const std::vector<Scanner::Segment>& segments) { return scanner.occluded(segments); };
   return sight;
 }

@@ -28,6 +28,10 @@ Pose sample_viewpoint(const Eigen::Vector3d& target, const ViewpointOptions& opt
 // Centre of the box around all the scene's objects; the origin if there is none.
 Eigen::Vector3d scene_centre(const Scene& scene);
 
+// From how far away, in metres, the objects are well seen from all sides: the ball around their centre that holds them
+// fills three quarters of the image's smaller side. Throws std::invalid_argument if the scene has no object.
+double viewing_distance(const Scene& scene, const Camera& camera);
+
 struct SyntheticViewOptions {
   ViewpointOptions viewpoint;
   SensorModel sensor = SensorModel::kRealsense;
@@ -44,12 +48,14 @@ struct SyntheticView {
 SyntheticView make_synthetic_view(const Scene& scene, const Camera& camera, const SyntheticViewOptions& options,
                                   Rng& rng);
 
-// Looks from T_world_camera, with a scanner of the scene at its poses.
-SyntheticView make_synthetic_view(const Scanner& scanner, const Camera& camera, const Pose& T_world_camera,
+// Of what was seen exactly from T_world_camera.
+SyntheticView make_synthetic_view(Scan truth, const Camera& camera, const Pose& T_world_camera,
                                   const SyntheticViewOptions& options, Rng& rng);
 
-// Why a camera at this place shows nothing of use: it is under the table (where there is one), or inside an object (by
-// the winding number of its mesh). Empty: it does.
-std::string viewpoint_problem(const Scene& scene, const Pose& T_world_camera, bool table = true);
+// Why a camera at this place shows nothing of use: it is under the table, or inside an object. Empty: it does.
+std::string viewpoint_problem(const Scene& scene, const Pose& T_world_camera);
+
+// Whether the point lies inside the closed mesh, by the solid angle that its triangles fill.
+bool encloses(const TriangleMesh& mesh, const Eigen::Vector3d& point);
 
 }  // namespace dofusion

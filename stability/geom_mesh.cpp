@@ -1,6 +1,7 @@
 #include "stability/geom_mesh.h"
 
 #include <cmath>
+#include <stdexcept>
 
 #include "stability/shapes.h"
 #include "stability/swept_mesh.h"
@@ -28,21 +29,12 @@ TriangleMesh cylinder(double radius, double half_length) {
                          kSides);
 }
 
-TriangleMesh rectangle(double half_x, double half_y) {
-  return {{{-half_x, -half_y, 0.0}, {half_x, -half_y, 0.0}, {half_x, half_y, 0.0}, {-half_x, half_y, 0.0}},
-          {{0, 1, 2}, {0, 2, 3}}};
-}
-
 }  // namespace
 
-TriangleMesh tessellated(const Geom& geom, double endless) {
+TriangleMesh tessellated(const Geom& geom) {
   check_geom(geom);
   const Eigen::Vector3d& size = geom.size;
   switch (geom.type) {
-    case GeomType::kPlane:
-      return rectangle(size.x() > 0.0 ? size.x() : endless, size.y() > 0.0 ? size.y() : endless);
-    case GeomType::kHeightField:
-      return height_field_mesh(*geom.height_field);
     case GeomType::kSphere:
       return capsule(size.x(), 0.0);
     case GeomType::kCapsule:
@@ -54,9 +46,12 @@ TriangleMesh tessellated(const Geom& geom, double endless) {
     case GeomType::kBox:
       return box_mesh(2.0 * size);
     case GeomType::kMesh:
+      return *geom.mesh;
+    case GeomType::kPlane:
+    case GeomType::kHeightField:
       break;
   }
-  return *geom.mesh;
+  throw std::invalid_argument("geom '" + geom.name + "': a plane or height field is no solid");
 }
 
 }  // namespace dofusion

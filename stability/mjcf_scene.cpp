@@ -148,7 +148,7 @@ std::vector<Pose> MjcfScene::poses(const std::vector<Pose>& T_world_moving) cons
 const std::vector<Geom>& MjcfScene::geoms() const { return impl_->geoms; }
 const std::vector<SceneCamera>& MjcfScene::cameras() const { return impl_->cameras; }
 
-SettleResult MjcfScene::settle(const PhysicsOptions& options) const {
+SettleResult MjcfScene::settle(const PhysicsOptions& options, const std::function<bool()>& stop) const {
   const mjModel& model = impl_->simulation->model();
   SettleResult still;
   still.status = SettleStatus::kSettled;
@@ -161,7 +161,7 @@ SettleResult MjcfScene::settle(const PhysicsOptions& options) const {
   loads.gravity = Eigen::Vector3d(model.opt.gravity);
   impl_->start();
   try {
-    return impl_->simulation->settle(options, loads, {options.time_limit, true}, {});
+    return impl_->simulation->settle(options, loads, {options.time_limit, true, stop}, {});
   } catch (const MujocoError& e) {
     throw InputError(impl_->path + ": cannot be simulated with its settings: " + e.what());
   }

@@ -1,6 +1,7 @@
 // MuJoCo XML (MJCF) files as scenes: any geoms, bodies fixed, free or on joints.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -53,8 +54,9 @@ class MjcfScene {
   // With the file's settings until everything that moves rests. Of `options`, the time limit and what rest is count,
   // nothing else. SettleResult is about moving(), with poses as initial_poses; in `touching`, -1 is everything that
   // does not move. Throws InputError naming the file if MuJoCo gives up (<size nstack> too small), or if it would take
-  // more than ten million steps.
-  SettleResult settle(const PhysicsOptions& options = {}) const;
+  // more than ten million steps. `stop` is asked before every step; once it says true, settling ends there and then as
+  // if the time limit were over.
+  SettleResult settle(const PhysicsOptions& options = {}, const std::function<bool()>& stop = {}) const;
 
   // The free bodies as uniform solids on the table z = 0, for the toolkit's own physics, at their initial poses or at
   // those of a SettleResult. Of the file's masses, friction and solver settings nothing remains.

@@ -1,6 +1,7 @@
 // Forward simulation of a scene in MuJoCo until everything rests.
 #pragma once
 
+#include <functional>
 #include <limits>
 #include <memory>
 #include <string>
@@ -16,13 +17,14 @@ struct PhysicsOptions {
   double friction = 0.8;           // sliding, object-object and object-table
   double rolling_friction = 5e-4;  // metres, of cylinders and spheres
   double timestep = 0.004;         // seconds
-  double contact_time = 0.01;      // seconds in which a contact's overlap is undone; stiffness, so not a multiple of timestep
-  double time_limit = 4.0;         // simulated seconds until a scene that still moves is given up
+  double contact_time =
+      0.01;                 // seconds in which a contact's overlap is undone; stiffness, so not a multiple of timestep
+  double time_limit = 4.0;  // simulated seconds until a scene that still moves is given up
   // A scene rests when every object has stayed this near to one pose for `rest_time` simulated seconds. Positions, not
   // speeds: a face on a face may tremble for ever within a few millionths of its size.
   double rest_time = 0.1;
-  double rest_shift = 5e-4;        // of the object's diameter
-  double rest_turn = 1e-3;         // radians
+  double rest_shift = 5e-4;  // of the object's diameter
+  double rest_turn = 1e-3;   // radians
 };
 
 // kDiverged: a state became infinite, or there were more contacts than MuJoCo had room for.
@@ -33,12 +35,14 @@ std::string to_string(SettleStatus status);
 struct Loads {
   Eigen::Vector3d gravity{0.0, 0.0, -9.81};  // m/s2, world
   std::vector<Eigen::Vector3d> forces;       // newtons at each object's centre of mass, world; empty: none
-  double forces_until = std::numeric_limits<double>::infinity();  // simulated seconds; rest is judged after that if finite
+  double forces_until =
+      std::numeric_limits<double>::infinity();  // simulated seconds; rest is judged after that if finite
 };
 
 struct RunLimits {
-  double seconds = 4.0;    // simulated
-  bool until_rest = true;  // stops once everything rests; otherwise runs on, and the status is kTimeLimit
+  double seconds = 4.0;             // simulated
+  bool until_rest = true;           // stops once everything rests; otherwise runs on, and the status is kTimeLimit
+  std::function<bool()> stop = {};  // asked before every step; true ends the run as if the time were over
 };
 
 struct SettleResult {

@@ -107,6 +107,7 @@ SettleResult Simulation::settle(const PhysicsOptions& options, const Loads& load
   RestWatch watch(options, bodies_);
   const double last_start = limits.seconds - model_->opt.timestep / 2.0;
   for (bool first = true; data_->time < last_start; first = false) {
+    if (limits.stop && limits.stop()) break;
     record(recording);
     if (pushed_for_a_while && data_->time >= loads.forces_until) {
       mju_zero(data_->xfrc_applied, 6 * model_->nbody);

@@ -1,11 +1,18 @@
 // dofusion-scan of a user's MuJoCo scene.
+#include <chrono>
 #include <cmath>
+#include <csignal>
+#include <filesystem>
+#include <thread>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
 
 #include "perception/depth_io.h"
+#include "perception/geom_scanner.h"
 #include "stability/files.h"
+#include "stability/mjcf_scene.h"
 #include "tests/apps/run_command.h"
 #include "tests/temporary_directory.h"
 
@@ -94,8 +101,105 @@ TEST_F(ScanMjcf, SampledViewpoints) {
   EXPECT_EQ(read("test/000000/scene_gt.json").size(), 3u);
 }
 
+// Half a metre of ball, whose tessellation would err by 0.5 mm, on a landscape; every pixel as GeomScanner sees it.
+TEST_F(ScanMjcf, RoundShapesAndLandscapesAreExact) {
+  std::string field;  // MuJoCo's own format: rows, columns, heights
+  const std::int32_t sizes[2] = {2, 3};
+  const float heights[6] = {0.0f, 0.5f, 1.0f, 0.2f, 0.1f, 0.9f};
+  field.append(reinterpret_cast<const char*>(sizes), sizeof sizes);
+  field.append(reinterpret_cast<const char*>(heights), sizeof heights);
+  write_file(directory_ / "field.bin", field);
+  write_file(file_, R"(<mujoco>
+  <asset><hfield name="field" file="field.bin" size="2 2 0.3 0.1"/></asset>
+  <worldbody>
+    <geom type="hfield" hfield="field"/>
+    <camera name="top" pos="0 0 3" fovy="40"/>
+    <body name="ball" pos="0 0 1"><freejoint/><geom size="0.5" rgba="0.9 0.1 0.1 1"/></body>
+    <body name="egg" pos="0.7 0 1"><freejoint/><geom type="ellipsoid" size="0.1 0.2 0.3"/></body>
+    <body name="pill" pos="-0.7 0 1" euler="30 40 0"><freejoint/><geom type="capsule" size="0.1 0.2"/></body>
+  </worldbody></mujoco>)");
+  expect_success(scan({"--camera", "top"}));
+  const MjcfScene scene(file_);
+  GeomScanner scanner(scene.geoms());
+  scanner.set_poses(scene.initial_poses());
+  const Camera camera = camera_of_fovy(40.0 * M_PI / 180.0, 320, 240);
+  const GeomScan truth = scanner.render(camera, camera_pose(scene.cameras()[0], scene.initial_poses()));
+  Camera written = camera;
+  written.depth_scale = 0.1;
+  const DepthImage depth = read_depth(directory_ / "out/test/000000/depth/000000.png", written);
+  const LabelImage ball = read_labels(directory_ / "out/test/000000/mask_visib/000000_000000.png", camera);
+  int differ = 0;
+  for (std::size_t i = 0; i < depth.pixels.size(); ++i) {
+    differ += std::abs(depth.pixels[i] - truth.depth.pixels[i]) > 0.5e-4f + 1e-6f ? 1 : 0;  // half a step
+    differ += (ball.pixels[i] != 0) != (truth.bodies.pixels[i] == 1) ? 1 : 0;
+  }
+  EXPECT_EQ(differ, 0);
+  // The ball's outline is a circle of 0.5 m seen from 2 m: of radius f tan(asin(1/4)).
+  const json info = read("test/000000/scene_gt_info.json")["0"][0];
+  const double radius = camera.fy * std::tan(std::asin(0.25));
+  EXPECT_NEAR(info["px_count_all"].get<double>(), M_PI * radius * radius, 3.0 * radius);  // a ring half a pixel wide
+  EXPECT_NEAR(info["bbox_obj"][2].get<double>(), 2.0 * radius, 1.5);
+}
+
+// In the middle of the picture: red, as the file has it.
+TEST_F(ScanMjcf, PicturesHaveTheFilesColours) {
+  write_file(file_, R"(<mujoco><worldbody><camera name="top" pos="0 0 3"/>
+    <body><freejoint/><geom size="0.5" rgba="0.9 0.1 0.1 1"/></body></worldbody></mujoco>)");
+  for (const std::string more : {"--pcd", "--fine-rgb"}) {
+    std::filesystem::remove_all(directory_ / "out");
+    expect_success(scan({"--camera", "top", more}));
+    const cv::Vec3b bgr = cv::imread(directory_ / "out/test/000000/rgb/000000.png").at<cv::Vec3b>(120, 160);
+    EXPECT_GT(bgr[2], 150);
+    EXPECT_LT(bgr[0], 80);
+  }
+}
+
+// The same scene ten times as large, and small: the distance follows the objects' size, and so do the steps of depth.
+TEST_F(ScanMjcf, TheDistanceFollowsTheObjectsSize) {
+  for (const double size : {0.01, 1.0, 20.0}) {
+    std::filesystem::remove_all(directory_ / "out");
+    const std::string edge = std::to_string(size);
+    write_file(file_, "<mujoco><worldbody><geom type='plane' size='0 0 1'/><body pos='0 0 " + edge +
+                          "'><freejoint/><geom type='box' size='" + edge + " " + edge + " " + edge +
+                          "'/></body></worldbody></mujoco>");
+    expect_success(scan({"--cameras", "2", "--json", directory_ / "scan.json"}));
+    // The ball around the cube fills three quarters of the image's height, of 2 atan(0.4).
+    EXPECT_NEAR(json::parse(read_file(directory_ / "scan.json"))["distance"].get<double>(),
+                std::sqrt(3.0) * size / std::sin(std::atan(0.3)), 1e-4 * size);
+    const json info = read("test/000000/scene_gt_info.json");
+    for (const auto& image : info) {
+      EXPECT_EQ(image[0]["px_count_valid"], image[0]["px_count_all"]);  // whole, and near enough to be read
+      EXPECT_GT(image[0]["px_count_all"].get<int>(), 320 * 240 / 10);
+    }
+  }
+}
+
+// Eight pendulums that swing for eight million steps, if nothing comes between.
+TEST_F(ScanMjcf, CtrlCEndsSettling) {
+  std::string bodies;
+  for (int k = 0; k < 8; ++k) {
+    bodies += "<body pos='0 " + std::to_string(k) + " 0'><joint axis='0 1 0'/><geom size='0.1' pos='1 0 0'/></body>";
+  }
+  write_file(file_, "<mujoco><option timestep='5e-7'/><worldbody>" + bodies + "</worldbody></mujoco>");
+  for (const std::vector<std::string>& words :
+       {std::vector<std::string>{"dofusion-scan", "--mjcf", file_, "--settle", "--out", directory_ / "out"},
+        {"dofusion-settle", file_}}) {
+    RunningCommand run(words);
+    std::this_thread::sleep_for(std::chrono::seconds(2));
+    ASSERT_FALSE(run.ended());
+    run.send(SIGINT);
+    const auto begin = std::chrono::steady_clock::now();
+    const CommandResult result = run.wait();
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(5));  // at once, on a busy machine
+    EXPECT_EQ(result.status, 1) << result.err;
+    EXPECT_NE(result.err.find("interrupted"), std::string::npos) << result.err;
+  }
+  EXPECT_EQ(entries(directory_.path()), std::vector<std::string>{"shelf.xml"});
+}
+
 TEST_F(ScanMjcf, WhatCannotBeScannedIsRefused) {
   expect_refusal(scan({"--camera", "front"}), {"front", "top, side"});
+  expect_refusal(scan({"--camera", "top", "front"}), {"front", "top, side"});
   expect_refusal(scan({"--camera", "top", "--cameras", "2"}), {"--camera"});
   expect_refusal(scan({"--task", "stack"}), {"--mjcf"});
   write_file(file_, "<mujoco><worldbody><geom size=\"1\"/></worldbody></mujoco>");
@@ -117,6 +221,16 @@ TEST_F(ScanMjcf, WhatCannotBeScannedIsRefused) {
              "<mujoco><worldbody><geom type=\"plane\" size=\"0 0 1\"/><camera name=\"under\" pos=\"0 0 -1\"/>"
              "<body name=\"b\" pos=\"0 0 0.1\"><freejoint/><geom size=\"0.1\"/></body></worldbody></mujoco>");
   expect_refusal(scan({"--camera", "under"}), {"scene 0", "image 0", "behind a plane"});
+  // Inside what does not move.
+  write_file(file_,
+             "<mujoco><worldbody><geom type=\"box\" size=\"1 1 1\"/><camera name=\"in\"/><body pos=\"0 0 2\">"
+             "<freejoint/><geom size=\"0.1\"/></body></worldbody></mujoco>");
+  expect_refusal(scan({"--camera", "in"}), {"image 0 (in)", "inside 'world'"});
+  // On the surface, as the humanoid's own eyes.
+  write_file(file_,
+             "<mujoco><worldbody><body><freejoint/><geom size=\"0.1\"/><camera name=\"eye\" pos=\"0.1 0 0\"/></body>"
+             "</worldbody></mujoco>");
+  expect_refusal(scan({"--camera", "eye"}), {"image 0 (eye)", "inside object 0", "--camera"});
   EXPECT_EQ(entries(directory_.path()), std::vector<std::string>{"shelf.xml"});
 }
 

@@ -43,7 +43,8 @@ struct WrittenScene {
     for (int u = 0; u < kCamera.width; ++u) view.depth.at(80, u) = 0.0f;  // a row without readings
     write_bop_models(scene.objects, kCamera, directory.path());
     const auto folder = directory.path() / "test" / bop_scene_name(0);
-    BopSceneWriter writer(scene, {1, 2}, folder);
+    const auto all = make_scene_scanner(scene);
+    BopSceneWriter writer(scene, *all, {1, 2}, folder);
     writer.add(0, kCamera, view, ColourImage(kCamera.width, kCamera.height));
     finish_bop_scene(folder, 1, scene);
   }
@@ -126,7 +127,8 @@ TEST(BopDataset, SilhouettesGoOnBeyondTheImage) {
   SyntheticView aside = written.view;
   aside.T_world_camera.translation().x() += 0.2;
   const auto folder = written.directory.path() / "test" / bop_scene_name(1);
-  BopSceneWriter writer(written.scene, {1, 2}, folder);
+  const auto all = make_scene_scanner(written.scene);
+  BopSceneWriter writer(written.scene, *all, {1, 2}, folder);
   writer.add(0, kCamera, aside, ColourImage(kCamera.width, kCamera.height));
   finish_bop_scene(folder, 1, written.scene);
   const json info = json::parse(read_file(folder / "scene_gt_info.json"))["0"][1];
@@ -138,8 +140,8 @@ TEST(BopDataset, SilhouettesGoOnBeyondTheImage) {
 TEST(BopDataset, CallersMistakesThrow) {
   const TemporaryDirectory directory;
   const Scene scene{{make_block("cube")}, {Pose::Identity()}};
-  EXPECT_THROW(BopSceneWriter(scene, {}, directory.path()), std::invalid_argument);
-  EXPECT_THROW(BopSceneWriter(scene, {1}, "/proc/nowhere"), InputError);
+  EXPECT_THROW(BopSceneWriter(scene, *make_scene_scanner(scene), {}, directory.path()), std::invalid_argument);
+  EXPECT_THROW(BopSceneWriter(scene, *make_scene_scanner(scene), {1}, "/proc/nowhere"), InputError);
 }
 
 }  // namespace

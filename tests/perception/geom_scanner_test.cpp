@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <random>
 
 #include <gtest/gtest.h>
 
@@ -69,6 +70,25 @@ TEST(GeomRays, Spheres) {
   expect_hit(GeomType::kSphere, {0.5, 0, 0}, {0, 0, 0.3}, {1, 0, 0}, 0.4, {0.4, 0, 0.3});  // from inside: its far side
   EXPECT_FALSE(intersect(GeomType::kSphere, {0.5, 0, 0}, {-2, 0, 0.51}, {1, 0, 0}));
   EXPECT_FALSE(intersect(GeomType::kSphere, {0.5, 0, 0}, {2, 0, 0}, {1, 0, 0}));  // behind the ray
+}
+
+// Inside is where the ray that leaves comes out with its normal along it, and only there.
+TEST(GeomRays, ContainsWhatRaysLeave) {
+  std::mt19937_64 engine(5);
+  std::uniform_real_distribution<double> size(0.05, 1.0), place(-1.2, 1.2);
+  for (const GeomType type : {GeomType::kSphere, GeomType::kCapsule, GeomType::kEllipsoid, GeomType::kCylinder,
+                              GeomType::kBox, GeomType::kPlane}) {
+    int inside = 0;
+    for (int i = 0; i < 5000; ++i) {
+      const Vector3d own(size(engine), size(engine), size(engine)), point(place(engine), place(engine), place(engine));
+      const Vector3d direction(place(engine), place(engine), place(engine));
+      const auto hit = intersect(type, own, point, direction);
+      const bool leaves = hit && hit->normal.dot(direction) > 0.0;
+      inside += leaves ? 1 : 0;
+      EXPECT_EQ(contains(type, own, point), leaves) << static_cast<int>(type) << " at " << point.transpose();
+    }
+    EXPECT_EQ(inside > 100, type != GeomType::kPlane);
+  }
 }
 
 TEST(GeomRays, FarOriginsCostNoDigits) {

@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include "stability/shapes.h"
+
 namespace dofusion {
 namespace {
 
@@ -47,6 +49,22 @@ TEST(SyntheticView, SceneCentreIsThatOfTheBoxAroundAll) {
                      make_pose(Eigen::Matrix3d::Identity(), {-0.1, 0.05, 0.075})}};
   EXPECT_LT((scene_centre(scene) - Eigen::Vector3d(0, 0.025, 0.05)).norm(), 1e-12);
   EXPECT_EQ(scene_centre({}), Eigen::Vector3d::Zero());
+}
+
+// A sphere's outline is a cone around it; it fills three quarters of the image's height. From all around it is whole.
+TEST(SyntheticView, FromTheViewingDistanceObjectsFillTheImage) {
+  const Camera camera = default_camera();
+  const Scene ball{{make_sphere("ball", 0.2)}, {make_pose(Eigen::Matrix3d::Identity(), {1, 2, 0.3})}};
+  const double outline = std::asin(0.2 / viewing_distance(ball, camera));
+  EXPECT_NEAR(2.0 * camera.fy * std::tan(outline), 0.75 * camera.height, 0.5);  // its mesh's corners lie on the sphere
+  EXPECT_THROW(viewing_distance({}, camera), std::invalid_argument);
+}
+
+TEST(SyntheticView, EnclosesWhatLiesInsideTheSurface) {
+  const TriangleMesh box = box_mesh({2, 4, 6});
+  EXPECT_TRUE(encloses(box, {0.9, -1.9, 2.9}));
+  EXPECT_FALSE(encloses(box, {1.1, 0, 0}));
+  EXPECT_FALSE(encloses({}, {0, 0, 0}));
 }
 
 TEST(SyntheticView, SeesEveryObjectAndRepeatsWithItsSeed) {
