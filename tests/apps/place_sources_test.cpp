@@ -45,7 +45,8 @@ class PlaceSourcesTest : public PlaceTest {
       const double azimuth = name == "a" ? 0.3 : 2.5;
       const Pose T_world_camera =
           look_at({0.5 * std::cos(azimuth), 0.5 * std::sin(azimuth), 0.45}, scene_centre(scene));
-      write_depth(make_synthetic_view(scanner, camera, T_world_camera, {}, rng).depth, camera, file(name + ".png"));
+      write_depth(make_synthetic_view(scanner.render(camera, T_world_camera), camera, T_world_camera, {}, rng).depth, camera,
+                  file(name + ".png"));
       write_file(file(name + ".json"), json{{"T_world_camera", rows_of(T_world_camera)}}.dump());
     }
   }

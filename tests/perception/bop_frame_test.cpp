@@ -30,7 +30,8 @@ struct Dataset {
     view.truth = scanner.render(kCamera, view.T_world_camera);
     view.depth = view.truth.depth;
     const std::filesystem::path folder = directory.path() / "test" / bop_scene_name(3);
-    BopSceneWriter writer(scene, {1}, folder);
+    const auto all = make_scene_scanner(scene);
+    BopSceneWriter writer(scene, *all, {1}, folder);
     writer.add(0, kCamera, view, ColourImage(kCamera.width, kCamera.height));
     finish_bop_scene(folder, 1, scene);
   }
