@@ -10,7 +10,7 @@
 namespace dofusion {
 
 // Noise scale at which the reverse process begins, in the model's lengths (a cube's edge, augmented_cloud.h) and
-// radians alike. Chosen by `refine_study --seed 7301` (tests/bench/README.md): less leaves the estimate's error, more
+// radians alike. Chosen by `refine_study --seed 7301`: less leaves the estimate's error, more
 // forgets the estimate.
 inline constexpr double kRefineSigma = 0.3;
 

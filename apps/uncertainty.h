@@ -9,8 +9,8 @@
 
 namespace dofusion {
 
-// Standard deviations. "Measured": on synthetic scans by `ranking_study --errors 40 --seed 7101 [--unknown]`, whose
-// output tests/bench/README.md quotes. The others cannot be measured there and are choices.
+// Standard deviations. "Measured": on synthetic scans by `ranking_study --errors 40 --seed 7101 [--unknown]`.
+// The others cannot be measured there and are choices.
 struct RecoveryUncertainty {
   // Objects of known shape. Measured (README of tests/bench, known, 1 view): at 90 % 0.15 mm, that is 2.15 of the
   // first, and 0.23 degrees, that is 1.64 of the second.
