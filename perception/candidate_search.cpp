@@ -53,12 +53,21 @@ class Level {
   }
 
   void align_and_climb(int worker, const AlignOptions& align, const ClimbOptions& climbing, Candidate& candidate) {
+    candidate.gain = gain(worker, candidate.placed);
+    align_and_climb_from_gain(worker, align, climbing, candidate);
+  }
+
+  // The same for a candidate whose gain is that of this level.
+  void align_and_climb_from_gain(int worker, const AlignOptions& align, const ClimbOptions& climbing,
+                                 Candidate& candidate) {
     PlacedObject& placed = candidate.placed;
     const auto objective = [&](const Pose& pose) { return gain(worker, {placed.model, pose, placed.freedom}); };
     const ObjectModel& model = models_[placed.model];
     const Pose aligned = align_to_readings(scorers_[worker], explanation_, model.object->mesh, placed.T_world_object,
                                            placed.freedom, align);
-    const Pose start = objective(aligned) > objective(placed.T_world_object) ? aligned : placed.T_world_object;
+    ScoredPose start{placed.T_world_object, candidate.gain};
+    const ScoredPose closer{aligned, objective(aligned)};
+    if (closer.score > start.score) start = closer;
     const ScoredPose climbed = climb(objective, start, placed.freedom, model.radius, climbing);
     placed.T_world_object = climbed.T_world_object;
     candidate.gain = climbed.score;
@@ -135,7 +144,7 @@ std::vector<Candidate> find_candidates(const std::vector<ObjectModel>& models, c
               [&](int worker, Candidate& candidate) { candidate.gain = coarse.gain(worker, candidate.placed); });
   candidates = best_distinct(std::move(candidates), models, options.coarse_kept, options.coarse_kept / 16);
   improve_all(candidates, options.threads, [&](int worker, Candidate& candidate) {
-    coarse.align_and_climb(worker, {3, 0.02, 0.01}, {0.004, 0.002, 1}, candidate);
+    coarse.align_and_climb_from_gain(worker, {3, 0.02, 0.01}, {0.004, 0.002, 1}, candidate);
   });
   candidates = best_distinct(std::move(candidates), models, options.medium_kept, options.medium_kept / 16);
   improve_all(candidates, options.threads, [&](int worker, Candidate& candidate) {

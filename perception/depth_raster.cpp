@@ -50,8 +50,9 @@ const RasterPatch& DepthRaster::render(const TriangleMesh& mesh, const Pose& T_c
   }
   const std::size_t size = static_cast<std::size_t>(patch_.width) * patch_.height;
   patch_.inverse_depth.assign(size, 0.0f);
-  patch_.face.assign(size, 0);
-  patch_.facing.assign(size, 0.0f);
+  // What an earlier patch left of these is behind no surface.
+  patch_.face.resize(size);
+  patch_.facing.resize(size);
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) fill_triangle(mesh.triangles[t], static_cast<int>(t));
   return patch_;
 }

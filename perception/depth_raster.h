@@ -16,7 +16,8 @@ struct RasterPatch {
   int width = 0, height = 0;         // pixels
   std::vector<float> inverse_depth;  // (height * width) 1/metres, 0 where the mesh is not seen
   std::vector<std::int32_t> face;    // (height * width) triangle, where inverse_depth > 0
-  std::vector<float> facing;         // (height * width) cosine of the incidence, taken in the triangle's middle
+  std::vector<float> facing;         // (height * width) cosine of the incidence, taken in the triangle's middle, where
+                                     // inverse_depth > 0; elsewhere some number between 0 and 1
 };
 
 // Holds the buffers of one thread; what `render` returns lives until the next call.

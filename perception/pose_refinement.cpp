@@ -1,6 +1,7 @@
 #include "perception/pose_refinement.h"
 
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Cholesky>
@@ -105,25 +106,30 @@ Pose align_to_readings(PoseScorer& scorer, const Explanation& scene, const Trian
   return pose;
 }
 
-ScoredPose climb(const PoseObjective& objective, const Pose& start, Freedom freedom, double radius,
+ScoredPose climb(const PoseObjective& objective, const ScoredPose& start, Freedom freedom, double radius,
                  const ClimbOptions& options) {
   const auto B = directions(freedom);
-  ScoredPose best{start, objective(start)};
+  const int count = static_cast<int>(B.cols());
+  ScoredPose best = start;
   for (double step = options.first_step; step > 0.99 * options.last_step; step *= 0.5) {
-    for (int round = 0; round < options.rounds_per_step; ++round) {
-      const double before = best.score;
-      for (int k = 0; k < B.cols(); ++k) {
+    // At the best pose so far `failed` directions in a row have led nowhere, and `came_from` leads back.
+    int failed = 0;
+    std::pair<int, double> came_from(-1, 0.0);
+    for (int round = 0; round < options.rounds_per_step && failed < count; ++round) {
+      for (int k = 0; k < count && failed < count; ++k) {
+        ++failed;
         for (const double sign : {1.0, -1.0}) {
+          if (came_from == std::pair(k, sign)) continue;
           const Vector6d direction = sign * step * B.col(k);
-          const ScoredPose candidate{moved(best.T_world_object, direction.head<3>(), direction.tail<3>() / radius),
-                                     0.0};
-          const double score = objective(candidate.T_world_object);
+          const Pose pose = moved(best.T_world_object, direction.head<3>(), direction.tail<3>() / radius);
+          const double score = objective(pose);
           if (score <= best.score) continue;
-          best = {candidate.T_world_object, score};
+          best = {pose, score};
+          came_from = {k, -sign};
+          failed = 0;
           break;
         }
       }
-      if (best.score <= before) break;
     }
   }
   return best;

@@ -35,9 +35,10 @@ struct ScoredPose {
   double score = 0.0;
 };
 
-// Coordinate search with halving steps for what has no derivative: outlines, free space, contact. `radius` (metres) is
-// the distance from the object's origin to its rim.
-ScoredPose climb(const PoseObjective& objective, const Pose& start, Freedom freedom, double radius,
+// Coordinate search with halving steps for what has no derivative: outlines, free space, contact. `start` has the score
+// that the objective gives it; `radius` (metres) is the distance from the object's origin to its rim. The objective is
+// expensive: with one step no pose is asked for twice in a row of failures, nor the one that was just left.
+ScoredPose climb(const PoseObjective& objective, const ScoredPose& start, Freedom freedom, double radius,
                  const ClimbOptions& options = {});
 
 // The pose moved by a translation (world) and turned about its own origin by a world-frame rotation vector.

@@ -44,6 +44,10 @@ float reading_cost_at(const Observation& seen, std::size_t pixel, float scene, f
                          One(seen.variance.pixels[pixel]), One(scene), One(facing))[0];
 }
 
+float table_cost_at(const Observation& seen, std::size_t pixel) {
+  return reading_cost_at(seen, pixel, seen.background.pixels[pixel], seen.table_facing);
+}
+
 // By how much N pixels of a patch lower the cost of the scene; 0 where the scene is nearer.
 template <int N>
 Pixels<N> gain_of_pixels(const Observation& seen, const ViewExplanation& scene, std::size_t in_scene,
@@ -101,6 +105,8 @@ Observation observe(const DepthImage& depth, const Camera& camera, const Table& 
     std::nth_element(sigmas.begin(), sigmas.begin() + sigmas.size() / 2, sigmas.end());
     seen.sigma = sigmas[sigmas.size() / 2];
   }
+  seen.table_cost = Image<float>(seen.camera.width, seen.camera.height);
+  for (std::size_t i = 0; i < seen.table_cost.pixels.size(); ++i) seen.table_cost.pixels[i] = table_cost_at(seen, i);
   return seen;
 }
 
@@ -110,6 +116,7 @@ void ignore_labels(const std::vector<std::uint8_t>& labels, Observation& observa
     observation.depth.pixels[i] = 0.0f;
     observation.variance.pixels[i] = kNoReading;
     observation.missing.pixels[i] = 0.0f;
+    observation.table_cost.pixels[i] = table_cost_at(observation, i);
   }
 }
 
@@ -129,15 +136,7 @@ PixelCounts& PixelCounts::operator+=(const PixelCounts& other) {
   return *this;
 }
 
-ViewExplanation ViewScorer::empty_scene() const {
-  ViewExplanation scene;
-  scene.depth = observation_->background;
-  scene.cost = Image<float>(scene.depth.width, scene.depth.height);
-  for (std::size_t i = 0; i < scene.depth.pixels.size(); ++i) {
-    scene.cost.pixels[i] = reading_cost_at(*observation_, i, scene.depth.pixels[i], observation_->table_facing);
-  }
-  return scene;
-}
+ViewExplanation ViewScorer::empty_scene() const { return {observation_->background, observation_->table_cost}; }
 
 void ViewScorer::add(const TriangleMesh& mesh, const Pose& T_world_object, ViewExplanation& scene) {
   const RasterPatch& patch = render(mesh, T_world_object);

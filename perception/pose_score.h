@@ -27,6 +27,7 @@ struct Observation {
   DepthImage background;      // z-depth of the bare table, a large number where the ray misses it
   double sigma = 0.0;         // metres, median of the readings' standard deviations
   float table_facing = 0.0f;  // cosine of the incidence on the table in the window's middle
+  Image<float> table_cost;    // of each pixel's reading under the bare table: ViewExplanation::cost
   LabelImage labels;
 };
 

@@ -43,9 +43,10 @@ PlacedObject refined_object(const std::vector<ObjectModel>& models, PoseScorer& 
   const AlignOptions closing{4, std::max(0.003, noise), noise + 0.0005};
   const Pose aligned =
       align_to_readings(scorer, scene, model.object->mesh, object.T_world_object, object.freedom, closing);
-  if (objective(aligned) > objective(object.T_world_object)) object.T_world_object = aligned;
-  object.T_world_object =
-      climb(objective, object.T_world_object, object.freedom, model.radius, {0.001, 0.00025, 2}).T_world_object;
+  ScoredPose start{object.T_world_object, objective(object.T_world_object)};
+  const ScoredPose closer{aligned, objective(aligned)};
+  if (closer.score > start.score) start = closer;
+  object.T_world_object = climb(objective, start, object.freedom, model.radius, {0.001, 0.00025, 2}).T_world_object;
   return object;
 }
 
@@ -56,14 +57,20 @@ SceneHypothesis refine_jointly(const std::vector<ObjectModel>& models, const Clu
   SceneHypothesis scene = start;
   scene.score = scene_score(models, cluster, scene.objects, true, costs);
   PoseScorer scorer(cluster.pyramid.fine);
+  int changes = 0;
+  std::vector<int> tried_at(scene.objects.size(), -1);  // after so many changes; nothing new comes of trying again then
   for (int round = 0; round < 2; ++round) {
     for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+      if (tried_at[i] == changes) continue;
+      tried_at[i] = changes;
       const std::vector<PlacedObject> others = without(scene.objects, i);
       const auto try_from = [&](const PlacedObject& object) {
         SceneHypothesis changed = scene;
         changed.objects[i] = refined_object(models, scorer, others, object, costs);
         changed.score = scene_score(models, cluster, changed.objects, true, costs);
-        if (changed.score > scene.score) scene = changed;
+        if (changed.score <= scene.score) return;
+        scene = changed;
+        ++changes;
       };
       try_from(scene.objects[i]);
       const PlacedObject& object = scene.objects[i];

@@ -85,7 +85,8 @@ TEST(PoseRefinement, ClimbReachesAMaximum) {
     const Pose off = goal.inverse() * pose;
     return -off.translation().squaredNorm() - 0.04 * 0.04 * so3_log(off.linear()).squaredNorm();
   };
-  const ScoredPose found = climb(objective, Pose::Identity(), Freedom::kFree, 0.04, {0.004, 0.0001, 10});
+  const ScoredPose found =
+      climb(objective, {Pose::Identity(), objective(Pose::Identity())}, Freedom::kFree, 0.04, {0.004, 0.0001, 10});
   EXPECT_LT((found.T_world_object.translation() - goal.translation()).norm(), 2e-4);
   EXPECT_LT(rotation_angle(found.T_world_object.linear().transpose() * goal.linear()), 5e-3);
   EXPECT_EQ(found.score, objective(found.T_world_object));
