@@ -35,7 +35,7 @@ Camera camera_of_fovy(double fovy, int width, int height);
 Pose look_at(const Eigen::Vector3d& eye, const Eigen::Vector3d& target);
 
 // BOP's camera.json: fx, fy, cx, cy, width, height, depth_scale. Throws InputError naming the file and the field
-// that is missing or wrong.
+// that is missing or wrong: focal lengths, sizes and depth_scale are positive, an image has 100 million pixels at most.
 Camera read_camera(const std::string& path);
 void write_camera(const Camera& camera, const std::string& path);
 

@@ -53,7 +53,8 @@ class GeomScanner {
   void set_group_visible(int group, bool visible);  // 0 to 5; throws std::invalid_argument
   void set_visible(int geom, bool visible);         // hides a geom whatever its group, or lets the group decide
 
-  // The same image for any number of threads.
+  // The same image for any number of threads. Throws std::invalid_argument unless the camera has a positive size and
+  // focal lengths. From below a plane, or inside a geom, it shows what is seen from there.
   GeomScan render(const Camera& camera, const Pose& T_world_camera, int threads = 1) const;
 
   struct Hit {

@@ -28,8 +28,9 @@ struct KnownRecoveryOptions {
 // is left out, with its label unused. The result is sorted by label, then by pixels. `pixels` counts the readings that
 // the object explains to 3 sigma; `score` is their share of the readings on or behind the object where it is in view,
 // times the share of its label's readings that the whole scene explains; `label` is 0 for an object that the
-// segmentation has missed. An empty list if there is no label above 1. Throws std::invalid_argument if an image is not
-// of the camera's size or the library is empty.
+// segmentation has missed. An empty list if there is no label above 1. Of an object that the image's border cuts, the
+// part inside counts. Readings that are not finite or not positive count as none. Throws std::invalid_argument if an
+// image is not of the camera's size, the camera's focal lengths are not positive, or the library is empty.
 std::vector<RecoveredObject> recover_known(const DepthImage& depth, const Camera& camera, const Table& table,
                                            const LabelImage& labels, const std::vector<ObjectPtr>& library,
                                            const KnownRecoveryOptions& options = {});

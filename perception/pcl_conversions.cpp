@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <sstream>
+#include <stdexcept>
 
 #include <Eigen/Dense>
 #include <pcl/conversions.h>
@@ -212,6 +213,39 @@ std::optional<CloudSegmentation> segment_cloud(const Cloud& cloud, const CloudSe
     for (const int i : clusters[c].indices) {
       result.labels[above_index[i]] = static_cast<std::uint8_t>(kLabelFirstObject + c);
     }
+  }
+  return result;
+}
+
+std::optional<CloudSegmentation> segment_by_convexity(const Cloud& cloud, const SegmentationOptions& options) {
+  constexpr float kHidden = 0.01F;  // metres
+  const std::optional<CloudView> view = view_cloud(cloud);
+  if (!view) return std::nullopt;
+  const std::optional<Table> table = find_table(view->depth, view->camera);
+  if (!table) return std::nullopt;
+  const LabelImage image = segment(view->depth, view->camera, *table, options);
+  CloudSegmentation result{*table, std::vector<std::uint8_t>(cloud.size(), kLabelNothing)};
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    if (!is_reading(cloud[i])) continue;
+    const Eigen::Vector2d pixel = project(view->camera, cloud[i].getVector3fMap().cast<double>());
+    const int u = std::clamp(static_cast<int>(std::lround(pixel.x())), 0, image.width - 1);
+    const int v = std::clamp(static_cast<int>(std::lround(pixel.y())), 0, image.height - 1);
+    if (cloud[i].z - view->depth.at(v, u) < kHidden) result.labels[i] = image.at(v, u);
+  }
+  return result;
+}
+
+LabelledCloud labelled(const Cloud& cloud, const std::vector<std::uint8_t>& labels) {
+  if (labels.size() != cloud.size()) {
+    throw std::invalid_argument(std::to_string(labels.size()) + " labels for " + std::to_string(cloud.size()) +
+                                " points");
+  }
+  LabelledCloud result(cloud.width, cloud.height);
+  result.header = cloud.header;
+  result.is_dense = cloud.is_dense;
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    result[i].getVector3fMap() = cloud[i].getVector3fMap();
+    result[i].label = labels[i];
   }
   return result;
 }

@@ -12,6 +12,7 @@
 #include "perception/camera.h"
 #include "perception/image.h"
 #include "perception/recovery.h"
+#include "perception/segmentation.h"
 #include "perception/table.h"
 #include "stability/scene.h"
 
@@ -26,7 +27,8 @@ Cloud read_cloud(const std::string& path);
 // A PCD file (binary_compressed), organised if the cloud is. Throws InputError naming the file if it cannot be written.
 void write_cloud(const Cloud& cloud, const std::string& path);
 
-// An organised cloud, one point a pixel; NaN where there is no reading.
+// An organised cloud, one point a pixel; NaN where there is no reading, or one that is not finite or not positive.
+// Throws std::invalid_argument if the image is not of the camera's size or the camera's focal lengths are not positive.
 Cloud to_cloud(const DepthImage& depth, const Camera& camera);
 
 // `count` points spread evenly over the object's surface (sample_surface_evenly), with outward unit normals; the
@@ -59,8 +61,18 @@ struct CloudSegmentation {
   std::vector<std::uint8_t> labels;  // one a point: 0 nothing, 1 table, 2, 3, … objects by falling number of points
 };
 
-// The table and Euclidean clusters above it, for clouds without an image's order. Objects that touch are not parted;
-// for organised clouds `segment` on `view_cloud` does that. nullopt if there is no table. At most 254 objects.
+// The table and Euclidean clusters above it, for clouds without an image's order. Objects that touch are not parted.
+// nullopt if there is no table. At most 254 objects.
 std::optional<CloudSegmentation> segment_cloud(const Cloud& cloud, const CloudSegmentationOptions& options = {});
+
+// The table and the objects as `segment` finds them in the image of view_cloud: parted where surfaces meet in a concave
+// edge, so that objects that touch or stand on one another part as well. A point has its pixel's label, unless another
+// point hides it there by more than a centimetre: then 0. nullopt if there is no such image, or no table in it.
+std::optional<CloudSegmentation> segment_by_convexity(const Cloud& cloud, const SegmentationOptions& options = {});
+
+// The points with their labels, organised if the cloud is; for PCL's viewers and filters. Throws std::invalid_argument
+// unless there is one label a point.
+using LabelledCloud = pcl::PointCloud<pcl::PointXYZL>;
+LabelledCloud labelled(const Cloud& cloud, const std::vector<std::uint8_t>& labels);
 
 }  // namespace dofusion

@@ -38,7 +38,8 @@ class Scanner {
   // Hides (false) or shows (true) object i.
   void set_visible(int object, bool visible);
 
-  // Throws std::invalid_argument unless the camera has a positive size and focal length.
+  // Throws std::invalid_argument unless the camera has a positive size and focal length. From inside an object one sees
+  // its far side, from below the table its lower side; viewpoint_problem (synthetic_view.h) says so beforehand.
   Scan render(const Camera& camera, const Pose& T_world_camera) const;
   // The same into images that are there already, whose memory is used again if their size fits: for many scans.
   void render(const Camera& camera, const Pose& T_world_camera, Scan& scan) const;

@@ -28,14 +28,15 @@ struct SegmentationOptions {
 // 0 nothing, 1 table, 2, 3, … objects, from the one with most pixels down; at most 254 objects. Readings above the
 // table are split into planar faces; faces that meet at convex edges make an object, concave edges and steps in
 // depth part objects (cf. Stein et al., "Object Partitioning using Local Convexity", CVPR 2014). Coplanar faces of
-// objects that touch cannot be told apart. An image without an object gives no label above 1. Throws
-// std::invalid_argument if the image is not of the camera's size.
+// objects that touch cannot be told apart. An image without an object gives no label above 1; of an object that the
+// image's border cuts, what is inside has its label. Readings that are not finite or not positive count as none. Throws
+// std::invalid_argument if the image is not of the camera's size or the camera's focal lengths are not positive.
 LabelImage segment(const DepthImage& depth, const Camera& camera, const Table& table,
                    const SegmentationOptions& options = {});
 
 // As segment, but with the objects from a user's mask: each value above 1 is one object (a 0/255 mask is one), in
 // ascending order; of its pixels those count that have a reading above the table's band. The table is labelled as
-// usual wherever the mask shows no object. Throws std::invalid_argument if the mask is not of the camera's size.
+// usual wherever the mask shows no object. Throws as segment, and if the mask is not of the camera's size.
 LabelImage segment_with_mask(const DepthImage& depth, const Camera& camera, const Table& table, const LabelImage& mask,
                              const SegmentationOptions& options = {});
 

@@ -42,9 +42,11 @@ inline Eigen::Vector3d pixel_ray(const Camera& camera, double u, double v) {
 }
 
 // The table that most readings lie on: RANSAC in inverse depth (PCL), then weighted least squares inside a band that
-// follows sigma(z). nullopt if no plane holds enough readings, among them images without a valid reading; readings that
-// are not finite or not positive count as none. Throws std::invalid_argument if the image is not of the camera's size
-// or the camera has no focal length.
+// follows sigma(z). nullopt if no plane holds enough readings, as in images without a valid reading, of one pixel or
+// row, or of noise; readings that are not finite or not positive count as none. Images of any size, at a cost that
+// grows with their pixels. The plane is whichever the camera sees most of, seen from its front: a lid where something
+// covers the table completely, a wall from inside a box, the lower side from below the table. Throws
+// std::invalid_argument if the image is not of the camera's size or the camera's focal lengths are not positive.
 std::optional<Table> find_table(const DepthImage& depth, const Camera& camera, const TableOptions& options = {});
 
 // The table as an inverse plane. The camera must be above the table.

@@ -29,8 +29,9 @@ struct UnknownRecoveryOptions {
 // For each label from 2 up a closed convex mesh that shows what is seen of the object and reaches down to the table or
 // to the object that it stands on. Objects are cut where they would overlap. Labels without enough readings, or whose
 // readings span no volume above their support, are left out; an image without objects gives an empty list. `score`
-// is the share of the object's readings that the mesh explains, less that which it contradicts. Throws
-// std::invalid_argument if an image is not of the camera's size.
+// is the share of the object's readings that the mesh explains, less that which it contradicts. Of an object that the
+// image's border cuts, the part inside counts. Readings that are not finite or not positive count as none. Throws
+// std::invalid_argument if an image is not of the camera's size or the camera's focal lengths are not positive.
 std::vector<RecoveredObject> recover_unknown(const DepthImage& depth, const Camera& camera, const Table& table,
                                              const LabelImage& labels, const UnknownRecoveryOptions& options = {});
 

@@ -19,7 +19,8 @@ struct ConvexPartsOptions {
 // piece whose hull exceeds it most, by the plane that leaves the smallest hulls; then pieces are joined again where
 // that adds little. Planes lie across the axes of the solid's largest faces, or its principal axes if it has none, and
 // along its own faces where those are flat: solids of boxes come apart exactly, however they are turned. Cavities and
-// several shells are fine; a convex mesh comes back as its hull. Same input, same parts. Throws std::invalid_argument
+// several shells are fine; a convex mesh comes back as its hull. Same input, same parts. Time grows with the triangles:
+// minutes beyond 100,000, where dofusion-place refuses meshes (apps/place_inputs.h). Throws std::invalid_argument
 // if the mesh is not closed, has no volume or is inside out, or on bad options.
 std::vector<TriangleMesh> convex_parts(const TriangleMesh& closed_mesh, const ConvexPartsOptions& options = {});
 

@@ -5,11 +5,13 @@
 
 #include <gtest/gtest.h>
 
+#include "perception/geom_scanner.h"
 #include "perception/known_recovery.h"
 #include "perception/pcl_conversions.h"
 #include "perception/scanner.h"
 #include "perception/segmentation.h"
 #include "perception/sensor_noise.h"
+#include "perception/synthetic_view.h"
 #include "perception/unknown_recovery.h"
 
 namespace dofusion {
@@ -84,7 +86,9 @@ TEST(BadInput, BadReadingsCountAsNone) {
   ASSERT_TRUE(table && expected);
   EXPECT_EQ(table->T_world_camera.matrix(), expected->T_world_camera.matrix());
   EXPECT_EQ(segment(depth, camera, *table).pixels, segment(without, camera, *expected).pixels);
-  EXPECT_EQ(recover(depth, camera).known.size(), 2u);
+  const Recovered found = recover(depth, camera);
+  EXPECT_EQ(found.known.size(), 2u);
+  EXPECT_EQ(found.unknown.size(), 2u);
 }
 
 TEST(BadInput, AFocalLengthOfZeroIsACallersMistake) {
@@ -100,6 +104,7 @@ TEST(BadInput, AFocalLengthOfZeroIsACallersMistake) {
     EXPECT_THROW(recover_known(depth, camera, table, labels, all_blocks()), std::invalid_argument);
     EXPECT_THROW(to_cloud(depth, camera), std::invalid_argument);
     EXPECT_THROW(Scanner({}).render(camera, kView), std::invalid_argument);
+    EXPECT_THROW(GeomScanner({}).render(camera, kView), std::invalid_argument);
   }
 }
 
@@ -113,6 +118,23 @@ TEST(BadInput, CamerasInsideAnObjectOrBelowTheTable) {
   const Recovered below = recover(noisy_view(two_blocks(), camera, look_at({0.1, -0.5, -0.5}, {0, 0, 0})), camera);
   EXPECT_TRUE(below.table);
   EXPECT_EQ(below.labels, 0);
+}
+
+TEST(BadInput, ScannersShowWhatIsSeenFromInsideAndFromBelow) {
+  const Camera camera = small_camera();
+  const Pose centre = look_at({0, 0, 1}, {1, 0, 1}), below = look_at({0, 0, -1}, {0, 0.01, 0});
+  Geom ball;
+  ball.size.x() = 1.0;
+  GeomScanner geoms({ball});
+  geoms.set_poses({above(0, 0, 1)});
+  // The far wall at the pixel in the middle, half a pixel (1/600 rad) off the axis.
+  EXPECT_NEAR(geoms.render(camera, centre).depth.at(60, 80), 1.0, 1e-5);
+  Scanner hall({make_box("hall", {2.0, 2.0, 2.0})});
+  hall.set_poses({above(0, 0, 1)});
+  EXPECT_NEAR(hall.render(camera, centre).depth.at(60, 80), 1.0, 1e-5);
+  EXPECT_NEAR(Scanner({}).render(camera, below).depth.at(60, 80), 1.0, 0.01);
+  EXPECT_NE(viewpoint_problem({{make_box("hall", {2.0, 2.0, 2.0})}, {above(0, 0, 1)}}, centre), "");
+  EXPECT_NE(viewpoint_problem({}, below), "");
 }
 
 TEST(BadInput, ImagesOfOnePixelAndOfOneRow) {
@@ -163,6 +185,7 @@ TEST(BadInput, AMillionRandomPoints) {
   ASSERT_TRUE(view);
   EXPECT_LE(view->camera.width, 640);
   EXPECT_EQ(recover(view->depth, view->camera).table, false);
+  EXPECT_FALSE(segment_by_convexity(cloud));
   const std::optional<CloudSegmentation> found = segment_cloud(cloud);  // some plane holds a few of them
   EXPECT_TRUE(!found || found->labels.size() == cloud.size());
 }

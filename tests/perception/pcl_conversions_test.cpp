@@ -43,6 +43,55 @@ TEST(PclConversions, AnUnorganisedCloudIsSegmented) {
   EXPECT_EQ(count_objects(segment(view->depth, view->camera, *table)), 2);
 }
 
+// Nearly all points of either of two objects have one label, and not the other's.
+void expect_parted(const LabelledCloud& cloud, const LabelImage& truth) {
+  ASSERT_EQ(cloud.size(), truth.pixels.size());
+  std::vector<int> most;
+  for (const int object : {2, 3}) {
+    std::vector<int> count(256, 0);
+    int all = 0;
+    for (std::size_t i = 0; i < cloud.size(); ++i) {
+      if (truth.pixels[i] != object) continue;
+      ++count[cloud[i].label];
+      ++all;
+    }
+    const auto largest = std::max_element(count.begin(), count.end());
+    EXPECT_GT(*largest, 0.9 * all);
+    most.push_back(static_cast<int>(largest - count.begin()));
+    EXPECT_GE(most.back(), int{kLabelFirstObject});
+  }
+  EXPECT_NE(most[0], most[1]);
+}
+
+// Objects that touch are one cluster; their concave edge parts them, in organised clouds and others.
+TEST(PclConversions, WhatTouchesPartsAtConcaveEdges) {
+  const std::vector<std::vector<TriangleMesh>> scenes{
+      {upright_box({0.2, 0.16, 0.05}, {0, 0, 0.025}, 0.2), upright_box({0.07, 0.07, 0.08}, {0, 0, 0.09}, 0.7)},
+      {upright_box({0.24, 0.06, 0.15}, {0, 0.1, 0.075}, 0.0), upright_box({0.08, 0.08, 0.07}, {0, 0.03, 0.035}, 0.0)}};
+  for (const std::vector<TriangleMesh>& boxes : scenes) {
+    const BoxImage image = render_boxes(boxes, test_camera(), kView, {0.0, 1.7e-3}, 4);
+    const Cloud cloud = to_cloud(image.depth, test_camera());
+    const std::optional<CloudSegmentation> clusters = segment_cloud(cloud);
+    ASSERT_TRUE(clusters);
+    EXPECT_EQ(*std::max_element(clusters->labels.begin(), clusters->labels.end()), kLabelFirstObject);
+
+    const std::optional<CloudSegmentation> parts = segment_by_convexity(cloud);
+    ASSERT_TRUE(parts);
+    const LabelledCloud out = labelled(cloud, parts->labels);
+    EXPECT_EQ(out.width, cloud.width);
+    EXPECT_EQ(out.height, cloud.height);
+    expect_parted(out, image.labels);
+
+    Cloud heap;  // the same points without their order
+    for (const pcl::PointXYZ& p : cloud) heap.push_back(p);
+    const std::optional<CloudSegmentation> heap_parts = segment_by_convexity(heap);
+    ASSERT_TRUE(heap_parts);
+    expect_parted(labelled(heap, heap_parts->labels), image.labels);
+  }
+  EXPECT_FALSE(segment_by_convexity({}));
+  EXPECT_THROW(labelled(Cloud(2, 1), {1}), std::invalid_argument);
+}
+
 TEST(PclConversions, AnObjectsCloudLiesEvenlyOnItsSurface) {
   const ObjectPtr cube = make_block("cube");  // 50 mm
   const SurfaceCloud cloud = to_cloud(*cube, 600, 3);
