@@ -30,12 +30,14 @@ int main(int argc, char** argv) {
       "  dofusion-scan --task unstructured --objects 3 --count 100 --out scans\n"
       "  dofusion-scan --data scenes.h5 --data-split test --cameras 5 --sensor kinect --out scans\n"
       "  dofusion-scan --mjcf kitchen.xml --settle --camera all --out kitchen\n"
-      "  dofusion-scan --count 20 --sensor none --pcd --fine-rgb --out exact",
+      "  dofusion-scan --count 20 --sensor none --pcd --fine-rgb --out exact\n"
+      "  dofusion-scan --count 20 --cameras 3 --pose-error 0.5 3 --out badly_calibrated",
       "dofusion-scan"};
   ScanJob job;
   job.threads = default_threads();
   std::string task = "unstructured", shapes = "blocks", sensor = "realsense", json;
   std::vector<int> size{job.camera.width, job.camera.height};
+  std::vector<double> pose_error{0.0, 0.0};
   auto* data = app.add_option("--data", job.data, "scenes of this dataset (HDF5, of dofusion-generate)");
   app.add_option("--data-split", job.data_split, "only the dataset's scenes of train, validation or test")->needs(data);
   auto* mjcf =
@@ -65,8 +67,14 @@ int main(int argc, char** argv) {
       ->capture_default_str()
       ->excludes(camera);
   app.add_option("--sensor", sensor, "none, kinect, kinect2, realsense or azure")->capture_default_str();
-  app.add_option("--noise-scale", job.view.noise_scale, "multiplies the sensor's noise")
+  app.add_option("--noise-scale", job.view.noise_scale, "multiplies the sensor's noise, and --pose-error")
       ->check(CLI::Range(0.0, 100.0))
+      ->capture_default_str();
+  app.add_option("--pose-error", pose_error,
+                 "a miscalibrated camera: degrees about each of its axes and millimetres along each axis (standard "
+                 "deviations) between its pose in scene_camera.json and the one that the image is taken from")
+      ->expected(2)
+      ->check(CLI::Range(0.0, 1000.0))
       ->capture_default_str();
   app.add_option("--distance", job.distance,
                  "from the camera to the objects' centre, metres; default: 0.7, or what the size of the MuJoCo scene's "
@@ -89,6 +97,8 @@ int main(int argc, char** argv) {
 
   return run_program(app, argc, argv, [&] {
     job.view.sensor = sensor_from_string(sensor);
+    job.view.miscalibration.rotation_deg = pose_error[0];
+    job.view.miscalibration.translation = pose_error[1] / 1000.0;
     job.camera = camera_of(size);
     job.generation.task = task_from_string(task);
     if (job.generation.task == Task::kSingle) job.generation.objects = 1;

@@ -32,18 +32,22 @@ bool is_new(const ScanJob& job) { return job.data.empty() && job.mjcf.file.empty
 ordered_json settings_of(const ScanJob& job, const GenerationOptions& generation, std::int64_t count) {
   ordered_json settings{{"format", "dofusion-scan"}, {"version", 1}};
   if (is_new(job)) settings["generation"] = ordered_json::parse(to_json(generation));
-  settings.update(ordered_json{{"count", count},
-                               {"cameras", job.cameras},
-                               {"sensor", to_string(job.view.sensor)},
-                               {"noise_scale", job.view.noise_scale},
-                               {"distance", job.view.viewpoint.distance},
-                               {"depth_scale", job.camera.depth_scale},
-                               {"size", {job.camera.width, job.camera.height}},
-                               {"focal_length", {job.camera.fx, job.camera.fy}},
-                               {"split", job.split},
-                               {"seed", job.seed},
-                               {"fine_rgb", job.fine_rgb},
-                               {"pcd", job.clouds}});
+  settings.update(
+      ordered_json{{"count", count},
+                   {"cameras", job.cameras},
+                   {"sensor", to_string(job.view.sensor)},
+                   {"noise_scale", job.view.noise_scale},
+                   {"pose_error_deg", job.view.miscalibration.rotation_deg},
+                   {"pose_error_m", job.view.miscalibration.translation},
+                   {"pose_error", {job.view.miscalibration.rotation_deg, job.view.miscalibration.translation}},
+                   {"distance", job.view.viewpoint.distance},
+                   {"depth_scale", job.camera.depth_scale},
+                   {"size", {job.camera.width, job.camera.height}},
+                   {"focal_length", {job.camera.fx, job.camera.fy}},
+                   {"split", job.split},
+                   {"seed", job.seed},
+                   {"fine_rgb", job.fine_rgb},
+                   {"pcd", job.clouds}});
   return settings;
 }
 

@@ -47,6 +47,15 @@ Json translation_mm_json(const Pose& pose) {
   return {t.x(), t.y(), t.z()};
 }
 
+Json camera_json(const CalibratedCamera& calibrated) {
+  const Camera& c = calibrated.camera;
+  const Pose T_camera_world = calibrated.T_world_camera.inverse();
+  return {{"cam_K", {c.fx, 0.0, c.cx, 0.0, c.fy, c.cy, 0.0, 0.0, 1.0}},
+          {"depth_scale", c.depth_scale},
+          {"cam_R_w2c", rotation_json(T_camera_world)},
+          {"cam_t_w2c", translation_mm_json(T_camera_world)}};
+}
+
 // Bounding box of pixels as BOP has it: x, y, width, height; -1 four times where there is none.
 struct PixelBox {
   int u0 = 0, v0 = 0, u1 = -1, v1 = -1;  // inclusive
@@ -132,10 +141,7 @@ void BopSceneWriter::add(int image, const Camera& c, const SyntheticView& view, 
 
   const Pose T_camera_world = view.T_world_camera.inverse();
   Json record;
-  record["camera"] = {{"cam_K", {c.fx, 0.0, c.cx, 0.0, c.fy, c.cy, 0.0, 0.0, 1.0}},
-                      {"depth_scale", c.depth_scale},
-                      {"cam_R_w2c", rotation_json(T_camera_world)},
-                      {"cam_t_w2c", translation_mm_json(T_camera_world)}};
+  record["camera"] = camera_json(view.believed.value_or(CalibratedCamera{c, view.T_world_camera}));
   const std::size_t objects = impl.scene.objects.size();
   std::vector<LabelImage> visible = visible_parts(view.truth.labels, objects);
   record["truth"] = Json::array();

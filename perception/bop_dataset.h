@@ -7,7 +7,8 @@
 //     mask/000000_000000.png                  silhouette of one object, what hides it ignored
 //     mask_visib/000000_000000.png            its visible part
 //     pcd/000000.pcd                          on request: the depth as organised points, camera frame, metres
-//     scene_camera.json  scene_gt.json  scene_gt_info.json
+//     scene_camera.json                       camera and pose as the user believes them to be (SyntheticView::believed)
+//     scene_gt.json  scene_gt_info.json       where objects are before the true camera, which saw the image
 //
 // tests/apps/bop_format_test.cpp reads such a dataset with code of its own and says what every file and key means.
 #pragma once

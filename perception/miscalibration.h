@@ -13,6 +13,10 @@ struct Miscalibration {
   double translation = 0.0;         // metres, of each coordinate of the camera's position
   double focal_pct = 0.0;           // per cent, of both focal lengths together
   double principal_point_px = 0.0;  // of cx and of cy
+
+  bool any() const {
+    return rotation_deg != 0.0 || translation != 0.0 || focal_pct != 0.0 || principal_point_px != 0.0;
+  }
 };
 
 struct CalibratedCamera {

@@ -68,6 +68,9 @@ SyntheticView make_synthetic_view(Scan truth, const Camera& camera, const Pose& 
   view.T_world_camera = T_world_camera;
   view.truth = std::move(truth);
   view.depth = apply_sensor_noise(view.truth, camera, options.sensor, options.noise_scale, rng);
+  if (options.miscalibration.any()) {  // drawn last, so that the image is the same with and without
+    view.believed = miscalibrated({camera, T_world_camera}, options.miscalibration, options.noise_scale, rng);
+  }
   return view;
 }
 

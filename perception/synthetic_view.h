@@ -1,9 +1,11 @@
 // One synthetic depth image of a scene: a viewpoint, an exact scan, the sensor's noise.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "perception/camera.h"
+#include "perception/miscalibration.h"
 #include "perception/scanner.h"
 #include "perception/sensor_noise.h"
 #include "stability/random.h"
@@ -35,13 +37,16 @@ double viewing_distance(const Scene& scene, const Camera& camera);
 struct SyntheticViewOptions {
   ViewpointOptions viewpoint;
   SensorModel sensor = SensorModel::kRealsense;
-  double noise_scale = 1.0;
+  Miscalibration miscalibration;
+  double noise_scale = 1.0;  // of the sensor's noise and of the miscalibration
 };
 
 struct SyntheticView {
   Pose T_world_camera = Pose::Identity();
   Scan truth;        // exact depth, labels in the order of the scene's objects, normals
   DepthImage depth;  // what the sensor reads
+  // What the user takes camera and pose for; none: they are known exactly. The image is what the true camera sees.
+  std::optional<CalibratedCamera> believed;
 };
 
 // Looks at the scene's centre from a random viewpoint.

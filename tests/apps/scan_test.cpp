@@ -1,4 +1,5 @@
 // dofusion-scan as a user meets it.
+#include <cmath>
 #include <filesystem>
 
 #include <gtest/gtest.h>
@@ -7,6 +8,7 @@
 #include "perception/depth_io.h"
 #include "stability/dataset.h"
 #include "stability/files.h"
+#include "stability/pose.h"
 #include "tests/apps/run_command.h"
 #include "tests/temporary_directory.h"
 
@@ -67,6 +69,45 @@ TEST(Scan, TakesASplitOfADataset) {
   EXPECT_EQ(json::parse(read_file(directory / "s.json")).at("scenes"), scenes);
 }
 
+// The image, and where the objects are before the camera that took it, stay; what is said of the camera's pose is
+// wrong.
+TEST(Scan, AMiscalibratedCameraIsElsewhereThanItsFileSays) {
+  const TemporaryDirectory directory;
+  const auto scan = [&](const std::string& out, std::vector<std::string> more) {
+    more.insert(more.end(), {"--task", "single", "--count", "2", "--cameras", "3", "--size", "160", "120", "--seed",
+                             "11", "--noise-scale", "2", "--out", directory / out});
+    expect_success(run_command("dofusion-scan", more));
+  };
+  scan("exact", {});
+  scan("off", {"--pose-error", "0.5", "3"});
+  for (const std::string& name : files_below(directory / "exact")) {
+    const bool same = read_file(directory / ("exact/" + name)) == read_file(directory / ("off/" + name));
+    EXPECT_EQ(same, name.find("scene_camera.json") == std::string::npos) << name;
+  }
+  const auto pose_in = [](const json& camera) {  // T_world_camera, millimetres
+    Pose pose = Pose::Identity();
+    for (int k = 0; k < 9; ++k) pose.matrix()(k / 3, k % 3) = camera.at("cam_R_w2c").at(k).get<double>();
+    for (int k = 0; k < 3; ++k) pose.matrix()(k, 3) = camera.at("cam_t_w2c").at(k).get<double>();
+    return pose.inverse();
+  };
+  for (const std::string scene : {"000000", "000001"}) {
+    const std::string file = "/test/" + scene + "/scene_camera.json";
+    const json exact = json::parse(read_file(directory / ("exact" + file)));
+    const json off = json::parse(read_file(directory / ("off" + file)));
+    for (const auto& [image, camera] : exact.items()) {
+      EXPECT_EQ(off.at(image).at("cam_K"), camera.at("cam_K"));
+      const Pose truth = pose_in(camera), believed = pose_in(off.at(image));
+      // Twice half a degree and 3 mm: five standard deviations of each of three components.
+      const Eigen::Vector3d turn = so3_log(truth.linear().transpose() * believed.linear()) * 180.0 / M_PI;
+      const Eigen::Vector3d shift = believed.translation() - truth.translation();
+      EXPECT_LT(turn.cwiseAbs().maxCoeff(), 5.0);
+      EXPECT_LT(shift.cwiseAbs().maxCoeff(), 30.0);
+      EXPECT_GT(turn.norm(), 0.01);
+      EXPECT_GT(shift.norm(), 0.06);
+    }
+  }
+}
+
 TEST(Scan, BadInputIsRefusedAndLeavesNothing) {
   const TemporaryDirectory directory;
   const auto scan = [&](std::vector<std::string> arguments) {
@@ -77,6 +118,8 @@ TEST(Scan, BadInputIsRefusedAndLeavesNothing) {
   expect_refusal(scan({"--task", "heap"}), {"heap"});
   expect_refusal(scan({"--split", "a/b"}), {"--split"});
   expect_refusal(scan({"--objects", "9"}), {"9"});
+  expect_refusal(scan({"--pose-error", "1"}), {"--pose-error"});
+  expect_refusal(scan({"--pose-error", "-1", "0"}), {"--pose-error"});
   expect_refusal(scan({"--data", directory / "none.h5"}), {"none.h5", "no such"});
   write_file(directory / "bad.h5", "no HDF5 at all");
   expect_refusal(scan({"--data", directory / "bad.h5"}), {"bad.h5"});
