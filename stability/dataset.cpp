@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <stdexcept>
 
 #include <nlohmann/json.hpp>
 
+#include "stability/child_process.h"
 #include "stability/dataset_shapes.h"
 #include "stability/files.h"
 #include "stability/hdf5_file.h"
@@ -232,7 +234,9 @@ Split split_of(std::uint64_t seed, int part, std::int64_t index, const SplitShar
   return u < shares.validation + shares.test ? Split::kTest : Split::kTrain;
 }
 
-SceneDataset read_dataset(const std::string& path, const DatasetFilter& filter) {
+namespace {
+
+SceneDataset read_checked(const std::string& path, const DatasetFilter& filter) {
   const Hdf5Reader reader(path);
   if (reader.text_attribute("format") != "dofusion-scenes") reader.fail("not a dataset of scenes");
   const std::int64_t version = reader.integer_attribute("version");
@@ -254,6 +258,35 @@ SceneDataset read_dataset(const std::string& path, const DatasetFilter& filter) 
     if (choice.takes(tables, i)) dataset.scenes.push_back(record_of(tables, i));
   }
   return dataset;
+}
+
+// Reads the file once in a child process, since HDF5's library crashes on some damaged ones.
+void try_in_child(const std::string& path) {
+  constexpr int kRead = 0, kRefused = 3;
+  std::error_code error;
+  const auto bytes = static_cast<double>(std::filesystem::file_size(path, error));
+  DatasetFilter none;
+  none.most = 0;
+  const auto read = [&](int pipe) {
+    try {
+      read_checked(path, none);
+    } catch (const InputError& e) {
+      write_all(pipe, e.what());
+      return kRefused;
+    }
+    return kRead;
+  };
+  const ChildResult child = run_in_child(read, reading_seconds(error ? 0.0 : bytes));
+  if (child.end == ChildResult::End::kReturned && child.status == kRead) return;
+  if (child.end == ChildResult::End::kReturned && child.status == kRefused) throw InputError(child.output);
+  throw InputError(path + ": damaged; the HDF5 library fails on it. Copy or generate it again");
+}
+
+}  // namespace
+
+SceneDataset read_dataset(const std::string& path, const DatasetFilter& filter) {
+  try_in_child(path);
+  return read_checked(path, filter);
 }
 
 void write_dataset(const SceneDataset& dataset, const std::string& path) {
