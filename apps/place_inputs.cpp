@@ -18,20 +18,14 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr double kBopModelsUnit = 0.001;  // metres: BOP's meshes are in millimetres
-constexpr std::size_t kMostTriangles = 100000;        // of a mesh: beyond, finding its convex parts takes minutes
 
 // The solid of a mesh file; `unit_option` is the argument that says its unit.
 ObjectAndOffset load_solid(const std::string& file, double unit, const std::string& unit_option) {
   ObjectAndOffset solid;
   try {
-    const MendedMesh mended = read_mended_mesh(file, unit);
+    const MendedMesh mended = read_mended_mesh(file, unit, kMostSolidTriangles);
     if (mended.holes > 0) std::fprintf(stderr, "%s\n", mending_note(file, mended).c_str());
-    const TriangleMesh& mesh = mended.mesh;
-    if (mesh.triangles.size() > kMostTriangles) {
-      throw InputError(file + ": a mesh of " + std::to_string(mesh.triangles.size()) + " triangles; simplify it to " +
-                       std::to_string(kMostTriangles) + " or fewer");
-    }
-    solid = make_object(fs::path(file).stem().string(), mesh);
+    solid = make_object(fs::path(file).stem().string(), mended.mesh);
     solid.object = with_convex_parts(solid.object);
   } catch (const std::invalid_argument& e) {
     throw InputError(file + ": " + e.what());

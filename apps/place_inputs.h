@@ -51,7 +51,11 @@ struct PlaceInputs {
   Eigen::Vector3d query_origin = Eigen::Vector3d::Zero();  // of the object's frame, in the mesh file's frame, metres
 };
 
-// Reads and checks everything; throws InputError naming the file or the argument and what is wrong.
+// Of a mesh of `query` or `objects`, in its file: beyond, finding its convex parts takes minutes.
+inline constexpr std::size_t kMostSolidTriangles = 100000;
+
+// Reads and checks everything; throws InputError naming the file or the argument and what is wrong. A mesh of more than
+// kMostSolidTriangles is such an error, whatever else is wrong with it; a million triangles take seconds to be refused.
 PlaceInputs load_inputs(const PlaceArguments& arguments);
 
 // Throws InputError if the outputs, written into `directory`, would replace one of the inputs.

@@ -118,9 +118,9 @@ TriangleMesh solid_of(const TriangleMesh& mesh, const SurfaceFaults& faults, dou
 
 }  // namespace
 
-TriangleMesh read_mesh(const std::string& path, double unit) {
+TriangleMesh read_mesh(const std::string& path, double unit, std::size_t most_triangles) {
   check_file(path);
-  const TriangleMesh mesh = weld(to_metres(import_mesh(path, kMostFileTriangles), unit, path));
+  const TriangleMesh mesh = weld(to_metres(import_mesh(path, most_triangles), unit, path));
   if (mesh.triangles.empty()) throw InputError(path + ": the mesh has no triangles");
   return mesh;
 }
@@ -132,8 +132,8 @@ TriangleMesh read_solid_mesh(const std::string& path, double unit) {
   return solid_of(mesh, faults, unit, path);
 }
 
-MendedMesh read_mended_mesh(const std::string& path, double unit) {
-  const TriangleMesh mesh = without_repeated_triangles(read_mesh(path, unit));
+MendedMesh read_mended_mesh(const std::string& path, double unit, std::size_t most_triangles) {
+  const TriangleMesh mesh = without_repeated_triangles(read_mesh(path, unit, most_triangles));
   const SurfaceFaults faults = surface_faults(mesh);
   MendedMesh mended;
   if (faults.open.count == 0) {
@@ -182,11 +182,13 @@ std::string to_obj(const TriangleMesh& mesh) {
     std::snprintf(line, sizeof line, "v %.9g %.9g %.9g\n", v.x(), v.y(), v.z());
     text += line;
   }
-  for (const Eigen::Vector3i& t : mesh.triangles) {
-    std::snprintf(line, sizeof line, "f %d %d %d\n", t[0] + 1, t[1] + 1, t[2] + 1);
-    text += line;
-  }
+  for (const Eigen::Vector3i& triangle : mesh.triangles) text += obj_face(triangle);
   return text;
+}
+
+std::string obj_face(const Eigen::Vector3i& triangle) {
+  return "f " + std::to_string(triangle[0] + 1) + " " + std::to_string(triangle[1] + 1) + " " +
+         std::to_string(triangle[2] + 1) + "\n";
 }
 
 void write_obj(const TriangleMesh& mesh, const std::string& path) { write_file(path, to_obj(mesh)); }

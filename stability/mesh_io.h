@@ -12,10 +12,11 @@ inline constexpr std::size_t kMostFileTriangles = 5000000;
 
 // Reads OBJ, STL, PLY, … ; coordinates are multiplied by `unit` to give metres. All parts of the file are merged,
 // polygons triangulated, equal vertices welded. Throws InputError naming the file if it cannot be read, has no
-// triangles or more than kMostFileTriangles, or has a coordinate that is not finite; the message names the first such
-// triangle. A child process runs assimp, which crashes on some damaged files and never returns from others: within 2 s
-// of processor time and 2 s more for every megabyte.
-TriangleMesh read_mesh(const std::string& path, double unit = 1.0);
+// triangles or more than `most_triangles` (its message says how many), or has a coordinate that is not finite; the
+// message names the first such triangle. A child process runs assimp, which crashes on some damaged files and never
+// returns from others: within 2 s of processor time and 2 s more for every megabyte. What has too many triangles is
+// refused there, before its triangles take memory here.
+TriangleMesh read_mesh(const std::string& path, double unit = 1.0, std::size_t most_triangles = kMostFileTriangles);
 
 // As read_mesh, for a mesh that bounds a solid. Triangles that are there twice are dropped; flipped ones are turned as
 // their neighbours are, and shells that are inside out, save walls of cavities. Several shells may be apart, or touch
@@ -31,7 +32,8 @@ struct MendedMesh {
   std::size_t holes = 0, open_edges = 0;  // that were filled; edges that bounded them
   double filled_share = 0.0;              // of the surface
 };
-MendedMesh read_mended_mesh(const std::string& path, double unit = 1.0);
+MendedMesh read_mended_mesh(const std::string& path, double unit = 1.0,
+                            std::size_t most_triangles = kMostFileTriangles);
 
 // "cup.stl: 2 holes (34 open edges) filled, 1.2 % of the surface"; empty if nothing was.
 std::string mending_note(const std::string& path, const MendedMesh& mended);
@@ -40,8 +42,9 @@ std::string mending_note(const std::string& path, const MendedMesh& mended);
 // with that unit, is under 1 mm or over 10 m; the message names the size, and a unit that would make it plausible.
 void check_object_size(const std::string& path, double object_diameter, double unit, const std::string& unit_option);
 
-// OBJ text, metres, with nine significant digits.
+// OBJ text, metres, with nine significant digits; and one line of it, for a triangle.
 std::string to_obj(const TriangleMesh& mesh);
+std::string obj_face(const Eigen::Vector3i& triangle);
 void write_obj(const TriangleMesh& mesh, const std::string& path);
 
 }  // namespace dofusion

@@ -142,9 +142,10 @@ TEST_F(PlaceBadInputTest, QueryMesh) {
   expect_refused({"--query", file("m.obj"), "--query-unit", "0"}, {"--query-unit"});
 }
 
-TEST_F(PlaceBadInputTest, QueryMeshOfTooManyTriangles) {
+// OBJ text of separate tetrahedra on a grid.
+std::string tetrahedra(int count) {
   std::string text;
-  for (int i = 0; i < 25001; ++i) {  // separate tetrahedra on a grid
+  for (int i = 0; i < count; ++i) {
     const Eigen::Vector3d at(i % 160, i / 160, 0);
     for (const Eigen::Vector3d& corner : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(0.5, 0, 0), Eigen::Vector3d(0, 0.5, 0),
                                           Eigen::Vector3d(0, 0, 0.5)}) {
@@ -153,8 +154,20 @@ TEST_F(PlaceBadInputTest, QueryMeshOfTooManyTriangles) {
     }
     text += "f -4 -2 -3\nf -4 -3 -1\nf -4 -1 -2\nf -3 -2 -1\n";
   }
-  write_file(file("m.obj"), text);
+  return text;
+}
+
+TEST_F(PlaceBadInputTest, MeshesOfTooManyTriangles) {
+  write_file(file("m.obj"), tetrahedra(25001));
   expect_refused({"--query", file("m.obj"), "--query-unit", "1e-3"}, {"m.obj", "100004 triangles", "simplify"});
+  fs::create_directories(file("large"));
+  write_file(file("large/m.obj"), tetrahedra(250000));
+  for (const std::string option : {"--query", "--objects"}) {
+    const std::string path = option == "--query" ? file("large/m.obj") : file("large");
+    const CommandResult run = place({option, path, option + "-unit", "1e-3"});
+    expect_refusal(run, {"large/m.obj", "1000000 triangles", "simplify it to 100000"});
+    EXPECT_LT(run.peak_mb, 1000.0);  // of this process and of assimp's
+  }
 }
 
 TEST_F(PlaceBadInputTest, Objects) {
@@ -202,6 +215,24 @@ TEST_F(PlaceBadInputTest, Cloud) {
   write_file(file("c.ply"), "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
                             "property float z\nend_header\n0 0 1\n0 x");
   expect_refused({"--cloud", file("c.ply")}, {"c.ply", "damaged"});
+}
+
+TEST_F(PlaceBadInputTest, AMillionRandomPointsHoldNoTable) {
+  Rng rng = make_rng(6);
+  std::string points;
+  constexpr int kPoints = 1000000;
+  for (int i = 0; i < kPoints; ++i) {
+    const float p[] = {static_cast<float>(uniform(rng, -1, 1)), static_cast<float>(uniform(rng, -1, 1)),
+                       static_cast<float>(uniform(rng, 0.2, 2))};
+    points.append(reinterpret_cast<const char*>(p), sizeof p);
+  }
+  const std::string count = std::to_string(kPoints);
+  write_file(file("c.pcd"), "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH " + count +
+                                "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " + count + "\nDATA binary\n" + points);
+  const CommandResult run = place({"--cloud", file("c.pcd")});
+  expect_success(run);
+  EXPECT_EQ(placements().at("status"), "no_table");
+  EXPECT_LT(run.peak_mb, 1000.0);
 }
 
 TEST_F(PlaceBadInputTest, Output) {
