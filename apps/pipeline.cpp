@@ -6,6 +6,7 @@
 #include "apps/stopwatch.h"
 #include "perception/known_recovery.h"
 #include "perception/plausibility.h"
+#include "perception/seen_surface.h"
 #include "perception/unknown_recovery.h"
 
 namespace dofusion {
@@ -71,6 +72,8 @@ RecoveredScene recover_scene(const std::vector<View>& given, const SceneRecovery
   const View& first = views.front();
   if (options.library.empty()) {
     result.objects = recover_unknown(views);
+    // Before the objects are moved away from their readings.
+    for (const RecoveredObject& object : result.objects) result.seen.push_back(seen_shares(object, views));
   } else {
     KnownRecoveryOptions known;
     known.threads = options.threads;

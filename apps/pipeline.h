@@ -25,6 +25,7 @@ struct RecoveredScene {
   std::vector<View> views;                 // as given, on the table: its world is theirs
   LabelImage labels;                       // 0 nothing, 1 table, 2 + i objects[i]
   std::vector<RecoveredObject> objects;    // at the poses of `scene`
+  std::vector<std::vector<float>> seen;    // of unknown objects: shares of the mesh's triangles (seen_surface.h)
   Scene scene;                             // physically plausible: everything rests
   SettleStatus settled = SettleStatus::kSettled;
   double moved_pct = 0.0;                  // how far the recovered objects moved to come to rest, of their diameters

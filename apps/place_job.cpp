@@ -15,6 +15,7 @@
 #include "apps/stopwatch.h"
 #include "perception/depth_io.h"
 #include "perception/mesh_sdf.h"
+#include "perception/seen_surface.h"
 #include "stability/files.h"
 #include "stability/mesh_io.h"
 #include "stability/mjcf.h"
@@ -233,7 +234,13 @@ void write_outputs(const std::string& directory, const PlaceInputs& inputs, cons
   Stopwatch watch;
   fs::create_directories(directory + "/objects");
   for (std::size_t i = 0; i < result.recovered.objects.size(); ++i) {
-    write_obj(result.recovered.objects[i].object->mesh, directory + "/" + object_file(i));
+    const TriangleMesh& mesh = result.recovered.objects[i].object->mesh;
+    const std::string file = directory + "/" + object_file(i);
+    if (result.recovered.seen.empty()) {
+      write_obj(mesh, file);
+    } else {
+      write_seen_obj(mesh, result.recovered.seen[i], file);
+    }
   }
   write_obj(inputs.query->mesh, directory + "/query.obj");
   write_file(directory + "/scene.xml", scene_xml(inputs, result, arguments.placement.physics));

@@ -29,7 +29,8 @@ PlaceResult run_placement(const PlaceInputs& inputs, const PlaceArguments& argum
 std::string placements_json(const PlaceInputs& inputs, const PlaceArguments& arguments, const PlaceResult& result);
 
 // Writes placements.json, segmentation.png, query.obj, objects/<i>.obj, scene.xml, scene.glb and report.html into
-// `directory`.
+// `directory`; for unknown objects objects/<i>.mtl too, whose material "never_seen" marks what no view shows
+// (perception/seen_surface.h).
 void write_outputs(const std::string& directory, const PlaceInputs& inputs, const PlaceArguments& arguments,
                    PlaceResult& result);
 

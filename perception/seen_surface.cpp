@@ -2,9 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <stdexcept>
+
+#include "stability/files.h"
+#include "stability/mesh_io.h"
 
 namespace dofusion {
 namespace {
+
+// Blue, and the grey of what is made up.
+constexpr char kMaterials[] =
+    "newmtl seen\nKd 0.26 0.47 0.75\n\n"
+    "newmtl never_seen\nKd 0.62 0.62 0.62\n";
 
 // The middles of the small triangles that a triangle splits into, evenly over it; barycentric.
 std::vector<Eigen::Vector3d> even_points() {
@@ -54,6 +64,23 @@ std::vector<float> seen_shares(const RecoveredObject& object, const std::vector<
     }
   }
   return shares;
+}
+
+void write_seen_obj(const TriangleMesh& mesh, const std::vector<float>& shares, const std::string& path) {
+  if (shares.size() != mesh.triangles.size()) {
+    throw std::invalid_argument(std::to_string(shares.size()) + " shares for " + std::to_string(mesh.triangles.size()) +
+                                " triangles");
+  }
+  const std::filesystem::path materials = std::filesystem::path(path).replace_extension(".mtl");
+  std::string text = "mtllib " + materials.filename().string() + "\n" + to_obj({mesh.vertices, {}});
+  for (const bool seen : {true, false}) {
+    text += seen ? "usemtl seen\n" : "usemtl never_seen\n";
+    for (std::size_t i = 0; i < shares.size(); ++i) {
+      if ((shares[i] > 0.0f) == seen) text += obj_face(mesh.triangles[i]);
+    }
+  }
+  write_file(materials, kMaterials);
+  write_file(path, text);
 }
 
 }  // namespace dofusion

@@ -187,6 +187,26 @@ TEST_F(PlaceTest, KnownBlocksAreFoundAndTheOutputsAreWhole) {
   EXPECT_EQ(names, (std::set<std::string>{"cube", "half_rectangle"}));
 }
 
+// Parts that were never seen are marked in a form that MuJoCo and assimp (check_outputs) read past.
+void check_marks(const std::string& out, const json& result) {
+  for (const json& object : result.at("objects")) {
+    const std::string file = out + "/" + object.at("mesh").get<std::string>();
+    const std::string obj = read_file(file);
+    EXPECT_THAT(obj, HasSubstr("usemtl never_seen\nf "));  // the bottom, at least
+    EXPECT_THAT(obj, HasSubstr("usemtl seen\nf "));
+    EXPECT_TRUE(fs::exists(fs::path(file).replace_extension(".mtl")));
+    const std::string xml = out + "/../mesh.xml";
+    write_file(xml, "<mujoco><asset><mesh name='m' file='" + file + "'/></asset><worldbody><geom type='mesh' mesh='m'/>"
+                    "</worldbody></mujoco>");
+    char error[500] = "";
+    const std::unique_ptr<mjModel, void (*)(mjModel*)> model(mj_loadXML(xml.c_str(), nullptr, error, sizeof error),
+                                                             mj_deleteModel);
+    ASSERT_NE(model, nullptr) << error;
+    EXPECT_EQ(model->nmeshface, static_cast<int>(read_mesh(file).triangles.size()));
+    fs::remove(xml);
+  }
+}
+
 TEST_F(PlaceTest, UnknownObjectsWithOneThreadAreReproducible) {
   const TestScan scan = scan_of(two_blocks(), small_camera());
   write_scan(scan);
@@ -202,6 +222,7 @@ TEST_F(PlaceTest, UnknownObjectsWithOneThreadAreReproducible) {
   check_report(out());
   check_glb(out(), result);
   check_scene(out(), result);
+  check_marks(out(), result);
   ASSERT_EQ(result.at("objects").size(), 2u);
   EXPECT_FALSE(result.at("objects").at(0).at("known").get<bool>());
   EXPECT_EQ(result.at("query").at("name"), "hat");

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
+#include <sstream>
 #include <stdexcept>
 
 #include <gtest/gtest.h>
@@ -11,6 +13,9 @@
 #include "perception/known_recovery.h"
 #include "perception/seen_surface.h"
 #include "perception/unknown_recovery.h"
+#include "stability/files.h"
+#include "stability/mesh_io.h"
+#include "tests/temporary_directory.h"
 
 namespace dofusion {
 namespace {
@@ -129,6 +134,33 @@ TEST(Views, FromOneSideHalfOfABoxIsMadeUp) {
       EXPECT_EQ(seen[i], 0.0f) << i;
     }
   }
+}
+
+TEST(Views, ObjFilesMarkWhatWasNeverSeen) {
+  const TemporaryDirectory directory;
+  const TriangleMesh box = box_mesh({0.05, 0.05, 0.05});
+  std::vector<float> shares(box.triangles.size(), 0.5f);
+  shares[3] = shares[7] = 0.0f;
+  write_seen_obj(box, shares, directory / "box.obj");
+  // Readers of materials find both, and those that merge parts the whole solid.
+  EXPECT_NEAR(volume(read_solid_mesh(directory / "box.obj")), std::pow(0.05, 3), 1e-10);
+  std::istringstream lines(read_file(directory / "box.obj"));
+  std::map<std::string, int> faces;
+  std::string material, word, line;
+  while (std::getline(lines, line)) {
+    std::istringstream words(line);
+    words >> word;
+    if (word == "usemtl") words >> material;
+    if (word == "f") ++faces[material];
+    if (word == "mtllib") {
+      EXPECT_EQ(line, "mtllib box.mtl");
+    }
+  }
+  EXPECT_EQ(faces, (std::map<std::string, int>{{"seen", 10}, {"never_seen", 2}}));
+  const std::string materials = read_file(directory / "box.mtl");
+  for (const char* name : {"newmtl seen\n", "newmtl never_seen\n"}) EXPECT_NE(materials.find(name), std::string::npos);
+  EXPECT_THROW(write_seen_obj(box, {1.0f}, directory / "box.obj"), std::invalid_argument);
+  EXPECT_THROW(write_seen_obj(box, shares, directory / "none/box.obj"), InputError);
 }
 
 TEST(Views, KnownObjectsAreFoundWhereNoSingleViewShowsAllOfThem) {
