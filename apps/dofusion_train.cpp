@@ -15,6 +15,7 @@ int main(int argc, char** argv) {
       "  dofusion-train --data one.h5 two.h5 --minutes 60 --out model.safetensors\n"
       "  dofusion-train --data one.h5 --minutes 60 --holdout-shape hat --out without_hat.safetensors\n"
       "  dofusion-train --data one.h5 --task stack --minutes 20 --out stacks.safetensors\n"
+      "  dofusion-train --data mine.h5 --from model.safetensors --minutes 20 --out mine.safetensors\n"
       "  dofusion-train --data one.h5 --steps 20000 --rank 1 --world-size 2 --rendezvous first-host:29500 …\n\n"
       "FILE.checkpoint, FILE.csv and FILE.svg appear beside the model; after a kill the same command with --resume "
       "goes "
@@ -25,9 +26,14 @@ int main(int argc, char** argv) {
   options.threads = default_threads();
   options.validate_minutes = 10.0;
   std::string json_path;
-  app.add_option("--preset", settings.preset, "default, or paper: the published method to the letter")
-      ->capture_default_str();
-  app.add_option("--config", settings.config_path, "JSON file of settings that replace the preset's");
+  CLI::Option* preset =
+      app.add_option("--preset", settings.preset, "default, or paper: the published method to the letter")
+          ->capture_default_str();
+  CLI::Option* config =
+      app.add_option("--config", settings.config_path, "JSON file of settings that replace the preset's");
+  app.add_option("--from", settings.from, "a model to begin with: its configuration and its weights")
+      ->excludes(preset)
+      ->excludes(config);
   app.add_option("--data", settings.data, "datasets of dofusion-generate; their scenes for training are used")
       ->required();
   app.add_option("--holdout-shape", settings.held_out_shape, "leave out every scene with this shape");

@@ -67,7 +67,8 @@ std::string html_begin(const std::string& title) {
   summary { cursor: pointer; font-size: 18px; font-weight: 700; margin: 28px 0 10px; }
   @media (max-width: 720px) {
     main { padding: 20px 16px 32px; } .row, .pairs { grid-template-columns: 1fr; }
-    table { font-size: 13px; } th { font-size: 12px; } th, td { padding: 4px 5px; } .wide { display: none; }
+    table { font-size: 13px; display: block; overflow-x: auto; } th { font-size: 12px; } th, td { padding: 4px 5px; }
+    .wide { display: none; } main { overflow-wrap: anywhere; }
   }
 </style>
 </head>

@@ -15,6 +15,7 @@
 #ifdef DOFUSION_VALIDATION
 #include "apps/evaluation.h"
 #endif
+#include "diffusion/weights.h"
 #include "stability/files.h"
 
 namespace dofusion {
@@ -40,7 +41,13 @@ void check_files(const TrainOptions& options) {
     throw InputError(options.out + ".checkpoint: no such file; there is no training to go on with");
 }
 
-ModelConfig read_config(const TrainSettings& settings) {
+// The configuration, and into `parameters` the weights to begin with, if a model is given.
+ModelConfig read_config(const TrainSettings& settings, std::vector<float>& parameters) {
+  if (!settings.from.empty()) {
+    ModelFile model = read_model(settings.from);
+    parameters = std::move(model.parameters);
+    return model.config;
+  }
   const ModelConfig config = make_config(preset_from_string(settings.preset));
   if (settings.config_path.empty()) return config;
   return config_from_json(read_file(settings.config_path), settings.config_path, config);
@@ -66,7 +73,8 @@ void check_held_out(const std::string& name, const std::vector<SceneDataset>& da
 
 // What the model file says of its data.
 Json record_of(const TrainSettings& settings, const std::vector<SceneDataset>& datasets) {
-  Json record{{"data", Json::array()}, {"holdout_shape", settings.held_out_shape}};
+  Json record{{"data", Json::array()}, {"holdout_shape", settings.held_out_shape}, {"tasks", settings.tasks}};
+  if (!settings.from.empty()) record["from"] = std::filesystem::path(settings.from).filename().string();
   for (std::size_t i = 0; i < datasets.size(); ++i)
     record["data"].push_back({{"file", std::filesystem::path(settings.data[i]).filename().string()},
                               {"scenes", datasets[i].scenes.size()},
@@ -111,7 +119,8 @@ std::unique_ptr<Peers> meet(const TrainSettings& settings) {
 Json train_model(const TrainSettings& settings) {
   const bool first = settings.rank == 0;
   if (first) check_files(settings.options);
-  const ModelConfig config = read_config(settings);
+  TrainOptions options = settings.options;
+  const ModelConfig config = read_config(settings, options.parameters);
 #ifdef DOFUSION_TORCH
   if (config.preset == Preset::kPaper) enable_torch_networks(settings.options.threads);
 #endif
@@ -134,7 +143,7 @@ Json train_model(const TrainSettings& settings) {
   if (first)
     std::fprintf(stderr, "%zu scenes, preset %s, %d threads%s\n", set.scenes(), to_string(config.preset).c_str(),
                  settings.options.threads, peers ? (", " + std::to_string(peers->count()) + " processes").c_str() : "");
-  const TrainResult result = train(set, config, settings.options, record.dump(), callbacks, peers.get());
+  const TrainResult result = train(set, config, options, record.dump(), callbacks, peers.get());
   if (!result.finished) throw Interrupted("interrupted; go on with --resume");
   return {{"finished", result.finished},
           {"steps", result.last.step},

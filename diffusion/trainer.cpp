@@ -221,7 +221,8 @@ class TrainingRun {
     run_.config = config_;
     run_.seed = options_.seed;
     run_.batch = options_.batch * processes();
-    run_.state = initial_state(network_->initial_parameters(options_.seed));
+    run_.state =
+        initial_state(options_.parameters.empty() ? network_->initial_parameters(options_.seed) : options_.parameters);
     if (options_.resume && is_first()) {
       Checkpoint left = read_checkpoint(network_->tensors(), checkpoint_path_);
       if (to_json(left.config) != to_json(config_) || left.seed != run_.seed || left.batch != run_.batch)
@@ -351,6 +352,9 @@ TrainResult train(const TrainingSet& data, const ModelConfig& config, const Trai
   if (options.minutes <= 0 && options.steps <= 0) throw InputError("training needs --minutes or --steps");
   if (options.batch < 1 || options.micro_batch < 1 || options.threads < 1)
     throw InputError("batch, micro batch and threads must be at least 1");
+  if (const std::size_t given = options.parameters.size();
+      given > 0 && given != static_cast<std::size_t>(make_network(config)->parameter_count()))
+    throw InputError("the parameters to begin with are not as many as the network has");
   return TrainingRun(data, config, options, record, callbacks, peers).go();
 }
 

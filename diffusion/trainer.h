@@ -25,6 +25,7 @@ struct TrainOptions {
   int micro_batch = 8;         // scenes that one thread works on at a time
   std::int64_t warm_up = 500;  // steps of rising learning rate
   OptimizerOptions optimizer;
+  std::vector<float> parameters;     // to begin with, as in ModelFile; empty: drawn from the seed
   double report_seconds = 10.0;      // between calls of `report`
   double checkpoint_seconds = 30.0;  // between checkpoints
   double validate_minutes = 0.0;     // between calls of `validate`; 0: none but at the end

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "diffusion/weights.h"
 #include "stability/dataset.h"
 #include "stability/files.h"
 #include "tests/apps/run_command.h"
@@ -54,6 +55,30 @@ TEST_F(TrainTest, ItsModelIsEvaluated) {
   expect_success(evaluate("again.json"));
   EXPECT_EQ(json::parse(read_file(directory_ / "again.json")).at("rows"), rows);
   EXPECT_THAT(read_file(directory_ / "m.safetensors.svg"), testing::HasSubstr("Loss by noise"));
+}
+
+// Its configuration and its weights are the beginning; what it came from is in the file.
+TEST_F(TrainTest, GoesOnFromAModel) {
+  expect_success(train({"--steps", "20"}));
+  const std::string out = directory_ / "tuned.safetensors";
+  const std::vector<std::string> arguments = {"--data",          directory_ / "d.h5",
+                                              "--from",          directory_ / "m.safetensors",
+                                              "--steps",         "2",
+                                              "--learning-rate", "1e-8",
+                                              "--out",           out};
+  expect_success(run_command("dofusion-train", arguments));
+  const ModelFile before = read_model(directory_ / "m.safetensors"), after = read_model(out);
+  EXPECT_EQ(to_json(after.config), to_json(before.config));
+  for (std::size_t i = 0; i < before.parameters.size(); ++i)
+    ASSERT_NEAR(after.parameters[i], before.parameters[i], 1e-6) << i;
+  EXPECT_EQ(json::parse(after.training).at("from"), "m.safetensors");
+
+  std::vector<std::string> both = arguments;
+  both.insert(both.end(), {"--preset", "paper"});
+  expect_refusal(run_command("dofusion-train", both), {"--from", "--preset"});
+  write_file(directory_ / "m.safetensors", "weights");
+  std::filesystem::remove(out);
+  expect_refusal(run_command("dofusion-train", arguments), {"m.safetensors"});
 }
 
 // Models of held-out shapes and without parts of the input stand beside one another; each file knows what it is.

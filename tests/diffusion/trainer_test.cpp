@@ -175,6 +175,19 @@ TEST_F(TrainerTest, CheckpointOfAnotherRunIsRefused) {
   EXPECT_THROW(train(data, small_config(), options_, ""), InputError);
 }
 
+TEST_F(TrainerTest, BeginsWithGivenParameters) {
+  const TrainingSet data({boxes_on_table(50, 1)}, small_config());
+  train(data, small_config(), options_, "");
+  options_.parameters = read_model(options_.out).parameters;
+  options_.optimizer.learning_rate = 0.0;
+  options_.optimizer.weight_decay = 0.0;
+  train(data, small_config(), options_, "");
+  const std::vector<float> after = read_model(options_.out).parameters;  // their running mean: the same but for rounding
+  for (std::size_t i = 0; i < after.size(); ++i) ASSERT_NEAR(after[i], options_.parameters[i], 1e-5f) << i;
+  options_.parameters.pop_back();
+  EXPECT_THROW(train(data, small_config(), options_, ""), InputError);
+}
+
 TEST_F(TrainerTest, BadOutputAndBudgetAreRefused) {
   const TrainingSet data({boxes_on_table(5, 1)}, small_config());
   TrainOptions no_budget = options_;
