@@ -6,6 +6,7 @@
 
 #include "apps/program.h"
 #include "apps/study.h"
+#include "apps/study_cases.h"
 #include "apps/study_report.h"
 #include "stability/files.h"
 
@@ -30,14 +31,17 @@ int main(int argc, char** argv) {
       "  dofusion-study --config study.json --trials 5000 --out study\n"
       "  mpirun -n 2 dofusion-study --config study.json --trials 5000 --out study\n\n"
       "All fields of the configuration, with their defaults:\n"
-      "  {\"sensor\": \"realsense\", \"distance_m\": 0.7, \"known\": true, \"series\": [],\n"
+      "  {\"sensor\": \"realsense\", \"distance_m\": 0.7, \"known\": true, \"views\": 1,\n"
+      "   \"pose_error\": [0, 0], \"series\": [],\n"
       "   \"noise_scales\": [0, 1, 2, 4],\n"
       "   \"tasks\": [{\"task\": \"single\", \"objects\": 1}, {\"task\": \"unstructured\", \"objects\": 2}],\n"
       "   \"samples\": 8, \"steps\": 50}\n"
       "and \"model\", a file relative to the configuration's folder; default: the shipped one.\n"
-      "Every scene is tried under each series too; a series says what differs, any of sensor, distance_m, known and\n"
-      "model:\n"
-      "  {\"series\": [{\"known\": false}, {\"distance_m\": 1}, {\"sensor\": \"kinect\"}]}",
+      "Every scene is tried under each series too; a series says what differs, any of sensor, distance_m, views,\n"
+      "pose_error, known and model:\n"
+      "  {\"series\": [{\"known\": false}, {\"distance_m\": 1}, {\"views\": 3, \"pose_error\": [0.2, 1]}]}\n"
+      "pose_error: degrees and millimetres between where the robot believes a camera to be and where it is (standard\n"
+      "deviations about and along each axis, times the noise scale).",
       "dofusion-study"};
   std::string config_path, out, model, json;
   StudyJob job;
@@ -73,6 +77,7 @@ int main(int argc, char** argv) {
     const StudySummary summary = summarise(rows, job.config, job.seed);
     OutputDirectory output(out);
     write_study(output.path().string(), rows, summary, job.config, settings, job.seed);
+    write_file((output.path() / "worst.html").string(), cases_html(job, worst_cases(rows)));
     output.commit();
     if (!json.empty()) write_file(json, to_json(summary, settings).dump(2) + "\n");
     std::error_code ignored;

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <cstdio>
 
-#include <Eigen/Geometry>
-
 #include "apps/html.h"
 #include "apps/program.h"
 #include "apps/viewer/viewer_script.h"
@@ -41,33 +39,15 @@ std::vector<Pose> generated_poses(const Scene& context, const Placement& placeme
   return poses;
 }
 
-// The depth camera zoomed to the part of its image that shows the objects and the best placements, with a border.
+// The depth camera zoomed to the objects and the best placements.
 Camera zoomed_camera(const PlaceInputs& inputs, const PlaceResult& result, std::size_t shown) {
-  Eigen::AlignedBox2d seen;
-  const Pose T_camera_world = result.recovered.table->T_world_camera.inverse();
-  const auto include = [&](const Object& object, const Pose& T_world_object) {
-    for (const Eigen::Vector3d& v : object.mesh.vertices) {
-      const Eigen::Vector3d p = T_camera_world * (T_world_object * v);
-      if (p.z() > 0.01) seen.extend(project(inputs.camera, p));
-    }
-  };
   const Scene& context = result.recovered.scene;
-  for (std::size_t i = 0; i < context.objects.size(); ++i) include(*context.objects[i], context.T_world_object[i]);
+  std::vector<Scene> scenes = {context};
   for (std::size_t k = 0; k < shown; ++k) {
-    include(*inputs.query, result.placements[k].T_world_sampled);
-    include(*inputs.query, result.placements[k].settled.back());
+    scenes.push_back({{inputs.query}, {result.placements[k].T_world_sampled}});
+    scenes.push_back({{inputs.query}, {result.placements[k].settled.back()}});
   }
-  if (seen.isEmpty()) return resized(inputs.camera, static_cast<double>(kPictureWidth) / inputs.camera.width);
-  const double width = std::max({seen.sizes().x() * 1.5, seen.sizes().y() * 1.5 * 4.0 / 3.0, 80.0});
-  const double zoom = kPictureWidth / width;
-  Camera camera = inputs.camera;
-  camera.width = kPictureWidth;
-  camera.height = kPictureWidth * 3 / 4;
-  camera.fx *= zoom;
-  camera.fy *= zoom;
-  camera.cx = (camera.cx - seen.center().x()) * zoom + camera.width / 2.0;
-  camera.cy = (camera.cy - seen.center().y()) * zoom + camera.height / 2.0;
-  return camera;
+  return zoomed_on(inputs.camera, result.recovered.table->T_world_camera, scenes, kPictureWidth);
 }
 
 std::string verdict(const Placement& placement) {

@@ -33,7 +33,7 @@ std::string run_scene(StudyRunner& runner, const StudyJob& job, std::int64_t ind
   const StudyRow reference = runner.reference_row(scene);
   std::string lines;
   for (std::int64_t trial = begin; trial < end; ++trial) {
-    lines += to_csv_line(runner.run(scene, trial, reference));
+    lines += to_csv_line(runner.run(scene, trial, reference).row);
   }
   return lines;
 }
@@ -75,7 +75,7 @@ void add_lines(const std::string& lines, PartialRows& rows) {
 }  // namespace
 
 std::string study_settings(const StudyJob& job) {
-  nlohmann::ordered_json settings = {{"format", "dofusion-study"}, {"version", 2}, {"seed", job.seed}};
+  nlohmann::ordered_json settings = {{"format", "dofusion-study"}, {"version", 3}, {"seed", job.seed}};
   settings["configuration"] = to_json(job.config);
   for (const StudyCondition& condition : job.config.series)
     settings["models_fnv1a"].push_back(hash_of(read_file(model_path(condition))));

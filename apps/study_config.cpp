@@ -1,5 +1,6 @@
 #include "apps/study_config.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <functional>
@@ -106,12 +107,29 @@ void take_condition(Fields& fields, StudyCondition& condition) {
   fields.take_name<SensorModel>("sensor", condition.sensor, sensor_from_string);
   fields.take<double>("distance_m", condition.distance_m, "a number between 0.1 and 10",
                       [](const double& d) { return d >= 0.1 && d <= 10.0; });
+  fields.take<int>("views", condition.views, "a whole number between 1 and 8",
+                   [](const int& n) { return n >= 1 && n <= 8; });
+  std::vector<double> pose_error = {condition.pose_error_deg, condition.pose_error_mm};
+  fields.take<std::vector<double>>(
+      "pose_error", pose_error, "[degrees, millimetres], each between 0 and 1000", [](const std::vector<double>& v) {
+        return v.size() == 2 && std::min(v[0], v[1]) >= 0.0 && std::max(v[0], v[1]) <= 1000.0;
+      });
+  condition.pose_error_deg = pose_error[0];
+  condition.pose_error_mm = pose_error[1];
   fields.take<bool>("known", condition.known, "true or false");
   fields.take<std::string>("model", condition.model, "a file's path");
 }
 
+nlohmann::ordered_json to_json(const StudyCondition& condition) {
+  return {{"sensor", to_string(condition.sensor)},
+          {"distance_m", condition.distance_m},
+          {"views", condition.views},
+          {"pose_error", {condition.pose_error_deg, condition.pose_error_mm}},
+          {"known", condition.known}};
+}
+
 bool is_same(const StudyCondition& a, const StudyCondition& b) {
-  return a.sensor == b.sensor && a.distance_m == b.distance_m && a.known == b.known && a.model == b.model;
+  return to_json(a) == to_json(b) && a.model == b.model;
 }
 
 StudyCondition condition_from_json(const json& entry, const StudyCondition& base, const std::string& source,
@@ -134,10 +152,6 @@ void take_series(Fields& fields, std::vector<StudyCondition>& series, const std:
       if (is_same(condition, other)) throw InputError(source + ": '" + name + "' is the same as a series before it");
     series.push_back(condition);
   }
-}
-
-nlohmann::ordered_json to_json(const StudyCondition& condition) {
-  return {{"sensor", to_string(condition.sensor)}, {"distance_m", condition.distance_m}, {"known", condition.known}};
 }
 
 std::string plain(double value) {
@@ -212,6 +226,11 @@ std::string series_title(const StudyConfig& config, std::size_t series) {
   if (first || own.known != base.known) parts.push_back(own.known ? "known objects" : "unknown objects");
   if (first || own.sensor != base.sensor) parts.push_back(sensor_title(own.sensor));
   if (first || own.distance_m != base.distance_m) parts.push_back("at " + plain(own.distance_m) + " m");
+  if (own.views != base.views || (first && own.views > 1))
+    parts.push_back(own.views == 1 ? "one view" : std::to_string(own.views) + " views");
+  if (own.pose_error_deg != base.pose_error_deg || own.pose_error_mm != base.pose_error_mm ||
+      (first && own.pose_error_deg + own.pose_error_mm > 0.0))
+    parts.push_back("camera poses off by " + plain(own.pose_error_deg) + "° and " + plain(own.pose_error_mm) + " mm");
   if (!first && own.model != base.model)
     parts.push_back(own.model.empty() ? "the shipped model" : std::filesystem::path(own.model).filename().string());
   std::string title;

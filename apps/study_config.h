@@ -21,9 +21,11 @@ struct StudyTask {
 // How the scenes are looked at, and what is known of them.
 struct StudyCondition {
   SensorModel sensor = SensorModel::kRealsense;
-  double distance_m = 0.7;  // from the camera to the scene's centre
-  bool known = true;        // the objects are among the shipped blocks; false: nothing is known of them
-  std::string model;        // of the placements, file; empty: the shipped one
+  double distance_m = 0.7;  // from each camera to the scene's centre
+  int views = 1;            // cameras, each from a direction of its own; the first ones are the same for any number
+  double pose_error_deg = 0.0, pose_error_mm = 0.0;  // of each camera's pose (miscalibration.h), times the noise scale
+  bool known = true;  // the objects are among the shipped blocks; false: nothing is known of them
+  std::string model;  // of the placements, file; empty: the shipped one
 };
 
 struct StudyConfig {
@@ -37,9 +39,9 @@ struct StudyConfig {
   std::int64_t trials_per_scene() const { return static_cast<std::int64_t>(series.size() * noise_scales.size()); }
 };
 
-// Reads the file. Its fields sensor, distance_m, known and model are the first series; each entry of its list `series`
-// is a further one, which names what differs from the first. A relative `model` is relative to the file's folder.
-// Throws InputError naming the file and the field that is unknown or wrong.
+// Reads the file. Its fields sensor, distance_m, views, pose_error (degrees and millimetres), known and model are the
+// first series; each entry of its list `series` is a further one, which names what differs from the first. A relative
+// `model` is relative to the file's folder. Throws InputError naming the file and the field that is unknown or wrong.
 StudyConfig read_study_config(const std::string& path);
 
 // As read_study_config; errors begin with `source`, and `model` is taken as it is.

@@ -46,8 +46,8 @@ void with_margins(PlotAxis& axis) {
 
 PlotAxis noise_axis(const StudySummary& summary, const StudyConfig& config) {
   PlotAxis axis;
-  axis.title =
-      "noise scale of " + sensor_title(config.base().sensor) + "; below: depth σ at " + plain(config.base().distance_m) + " m";
+  axis.title = "noise scale of " + sensor_title(config.base().sensor) + "; below: depth σ at " +
+               plain(config.base().distance_m) + " m";
   for (const StudyPoint& p : summary.base()) {
     axis.ticks.push_back(
         {p.noise_scale, plain(p.noise_scale), (p.depth_sigma_mm == 0.0 ? "0" : one_decimal(p.depth_sigma_mm)) + " mm"});
@@ -122,9 +122,10 @@ PlotPanel success_panel(const StudySummary& summary, const StudyConfig& config) 
   };
   const char* recovery = config.base().known ? "all objects recovered, shapes right" : "number of objects right";
   panel.curves = {
-      curve_of(summary.base(), recovery, kPurple, Marker::kDiamond, share(config.base().known ? "shapes_right" : "objects_right"),
+      curve_of(summary.base(), recovery, kPurple, Marker::kDiamond,
+               share(config.base().known ? "shapes_right" : "objects_right"), 100.0),
+      curve_of(summary.base(), "stands in the recovered scene", kBlue, Marker::kCircle, share("stable_recovered"),
                100.0),
-      curve_of(summary.base(), "stands in the recovered scene", kBlue, Marker::kCircle, share("stable_recovered"), 100.0),
       curve_of(summary.base(), "stands in the true scene", kVermilion, Marker::kSquare, share("stable_true"), 100.0)};
   panel.references = {reference_of("true scene given to the model", kGreen, "9 4", summary.ground_truth.stable, 100.0),
                       reference_of("random placement", kGrey, "2 4", summary.random.stable, 100.0)};

@@ -9,11 +9,12 @@
 
 namespace dofusion {
 
-// Of the first series: median displacement against noise in the recovered and in the true scene, with 95 % bands and the two references:
-// translation on the left, rotation on the right.
+// Of the first series: median displacement against noise in the recovered and in the true scene, with 95 % bands and
+// the two references: translation on the left, rotation on the right.
 std::string displacement_svg(const StudySummary& summary, const StudyConfig& config);
 
-// Of the first series: the share of scenes that are recovered and of placements that stand, and what failed first in the others.
+// Of the first series: the share of scenes that are recovered and of placements that stand, and what failed first in
+// the others.
 std::string success_svg(const StudySummary& summary, const StudyConfig& config);
 
 // All series beside one another, in the true scene: the share of placements that stand, and the median translation.

@@ -83,8 +83,7 @@ std::string summary_table(const std::vector<StudyPoint>& points) {
   }
   for (std::size_t i = 0; i < failure_names().size(); ++i) {
     html += "<tr><td>Failed first: " + failure_titles()[i] + ", %</td>";
-    for (const StudyPoint& p : points)
-      html += "<td>" + number(100.0 * p.failures.at(failure_names()[i])) + "</td>";
+    for (const StudyPoint& p : points) html += "<td>" + number(100.0 * p.failures.at(failure_names()[i])) + "</td>";
     html += "</tr>\n";
   }
   return html + "</tbody></table></div>\n";
@@ -137,36 +136,34 @@ std::string lead(const StudySummary& summary, const StudyConfig& config) {
   };
   return "<p class=\"lead\">" + std::to_string(summary.trials) + " trials on " + std::to_string(summary.scenes) +
          " scenes" + (config.series.size() > 1 ? " in " + std::to_string(config.series.size()) + " series" : "") +
-         ", one view of each. The first series: " + series_title(config, 0) + ". " + clause(first) +
+         ". The first series: " + series_title(config, 0) + ". " + clause(first) +
          (summary.base().size() > 1 ? "; " + clause(last) : "") + ".</p>\n";
 }
 
 std::string method(const StudyConfig& config, std::uint64_t seed) {
-  return "<p>Every trial runs the whole chain. A stable scene is generated (in turn: " + tasks_text(config) +
-         "), scanned from a random viewpoint 30° to 60° above the table, and recovered from that one depth image: "
-         "table, "
-         "segmentation, " +
-         (config.base().known ? "which of the seven blocks stand where" : "the shapes and poses of unknown objects") +
-         ". For one more block the model draws " + std::to_string(config.samples) + " poses in " +
-         std::to_string(config.steps) +
-         " steps; they are settled in the recovered scene and the best-ranked one is taken. "
-         "Its pose relative to the camera, which is what a robot has, is then put into the <em>true</em> scene and "
-         "settled there. Trials of one scene share viewing direction, query and all seeds; within a series they differ in the noise alone. "
-         "Seed " +
+  return "<p>Every trial runs the whole chain, as <code>dofusion-place</code> does. A stable scene is generated (in "
+         "turn: " +
+         tasks_text(config) +
+         "), scanned from random viewpoints 30° to 60° above the table, and recovered from those depth images: table, "
+         "segmentation, and which of the seven blocks stand where or, of unknown objects, their shapes. For one more "
+         "block the model draws " +
+         std::to_string(config.samples) + " poses in " + std::to_string(config.steps) +
+         " steps; they are settled in the recovered scene, and the one is taken that stands most probably in what the "
+         "scene may really be. Its pose relative to where the robot believes its camera to be is then put into the "
+         "<em>true</em> scene and settled there. Trials of one scene share viewing directions, query and all seeds; "
+         "within a series they differ in the noise alone. Seed " +
          std::to_string(seed) +
          ".</p>\n"
          "<p>A displacement is the largest over all objects, context and query: translation in per cent of that "
-         "object's "
-         "diameter, and rotation. A placement stands if the scene comes to rest with both under 10 % and 10°. A trial "
-         "without a displacement (no table was found, or the simulation diverged) counts as larger than any. A "
-         "candidate "
-         "that stands is replaced by the pose at which it came to rest, so that in the scene it was made for, the "
-         "recovered "
-         "one, next to nothing is left to move. "
-         "A placement can stand in the true scene although the recovery was wrong: beside what was missed. "
-         "What failed first is told of trials whose placement does not stand in the true scene: no table; a wrong "
-         "number "
-         "of objects; a known object taken for another; an object off by more than " +
+         "object's diameter, and rotation. A placement stands if the scene comes to rest with both under 10 % and 10°. "
+         "A trial without a displacement (no table was found, or the simulation diverged) counts as larger than any. A "
+         "candidate that stands is replaced by the pose at which it came to rest, so that in the scene it was made "
+         "for, "
+         "the recovered one, next to nothing is left to move. A placement can stand in the true scene although the "
+         "recovery was wrong: beside what was missed. What failed first is told of trials whose placement does not "
+         "stand in the true scene: no table; a wrong number of objects; a known object taken for another; an object "
+         "off "
+         "by more than " +
          plain(kPoseErrorPct) +
          " % of its diameter; or, with all that right, the placement itself.</p>\n"
          "<p>Intervals are 95 % bootstrap intervals over the trials; one of zero width means that all trials agreed. "
@@ -186,8 +183,8 @@ std::string study_html(const StudySummary& summary, const StudyConfig& config, s
   return html_begin(title) + kStyle + "<h1>" + title + "</h1>\n" + lead(summary, config) +
          "<h2>Displacement against noise</h2>\n<figure>" + displacement_svg(summary, config) + "</figure>\n" +
          "<h2>Success, and what fails</h2>\n<figure>" + success_svg(summary, config) + "</figure>\n" +
-         comparison(summary) + "<h2>In numbers</h2>\n<p>Shares, and medians with their 95 % intervals.</p>\n" +
-         summary_tables(summary) +
+         "<p>The worst of them, in pictures: <a href=\"worst.html\">worst.html</a>.</p>\n" + comparison(summary) +
+         "<h2>In numbers</h2>\n<p>Shares, and medians with their 95 % intervals.</p>\n" + summary_tables(summary) +
          reference_table(summary) + "<h2>What was done</h2>\n" + method(config, seed) + html_end();
 }
 

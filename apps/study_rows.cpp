@@ -20,6 +20,9 @@ void for_each_column(Row& row, Visit visit) {
   visit("noise_scale", row.noise_scale);
   visit("sensor", row.sensor);
   visit("distance_m", row.distance_m);
+  visit("views", row.views);
+  visit("pose_error_deg", row.pose_error_deg);
+  visit("pose_error_mm", row.pose_error_mm);
   visit("known", row.known);
   visit("task", row.task);
   visit("context", row.context);

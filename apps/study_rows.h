@@ -20,15 +20,18 @@ struct StudyRow {
   double noise_scale = 0.0;
   std::string sensor;
   double distance_m = 0.0;
+  int views = 1;
+  double pose_error_deg = 0.0, pose_error_mm = 0.0;  // standard deviations at noise scale 1
   bool known = false;
   std::string task;
   std::string context;  // the blocks on the table, "cube+hat"
   std::string query;    // the block to place
   int objects_true = 0;
-  std::int64_t fewest_pixels = 0;  // that an object of the true scene shows
+  std::int64_t fewest_pixels = 0;  // that an object of the true scene shows to the first camera
   std::optional<int> objects_found;
   std::optional<int> shapes_right;  // of the matched objects; known objects only
-  // Recovered objects are matched with the nearest true ones, in the frame of the camera.
+  // Recovered objects are matched with the nearest true ones, in the robot's frame: where the cameras are believed to
+  // be.
   std::optional<double> position_error_mean_mm, position_error_max_mm;  // between centres of mass
   // The worst matched object's error, of its diameter. Same shape: the largest distance from a corner to the nearest
   // corner of the other, so that symmetric poses count as the same; other shapes and unknown objects: between centres.
@@ -36,12 +39,14 @@ struct StudyRow {
   std::optional<double> table_angle_deg;  // between true and recovered table
   std::optional<double> table_offset_mm;  // between them, along the normal, where the optical axis meets the table
   std::optional<int> candidates_stable;   // in the recovered scene
-  // The best-ranked placement, settled: in the recovered scene, and at the same pose before the camera in the true one.
+  // The best-ranked placement, settled: in the recovered scene, and at the same pose in the robot's frame in the true
+  // one.
   std::optional<double> displacement_recovered_pct, displacement_recovered_deg;
   std::optional<bool> stable_recovered;
   std::optional<double> displacement_true_pct, displacement_true_deg;
   std::optional<bool> stable_true;
-  // The two references, the same in all trials of a scene, by the first series' model: placed on the true scene with the same seed, and at random.
+  // The two references, the same in all trials of a scene, by the first series' model: placed on the true scene with
+  // the same seed, and at random.
   std::optional<double> displacement_ground_truth_pct, displacement_ground_truth_deg;
   bool stable_ground_truth = false;
   std::optional<double> displacement_random_pct, displacement_random_deg;

@@ -5,11 +5,10 @@
 #include <limits>
 
 #include "apps/assets.h"
-#include "apps/pipeline.h"
-#include "apps/placement.h"
 #include "apps/program.h"
+#include "apps/ranking.h"
 #include "apps/stopwatch.h"
-#include "perception/synthetic_view.h"
+#include "apps/uncertainty.h"
 #include "stability/generation.h"
 #include "stability/mesh_io.h"
 #include "stability/shapes.h"
@@ -117,11 +116,52 @@ Outcome outcome_of(const Placement& placement) {
 }
 
 // The query put at exactly this pose.
-Outcome settle_at(const Scene& scene, const ObjectPtr& query, const Pose& T_world_query) {
+Placement settle_at(const Scene& scene, const ObjectPtr& query, const Pose& T_world_query) {
   PlacementOptions options;
   options.polish = false;
   options.trials = 0;
-  return outcome_of(check_placements(scene, query, {T_world_query}, options).front());
+  return check_placements(scene, query, {T_world_query}, options).front();
+}
+
+Pose believed_pose(const SyntheticView& view) {
+  return view.believed ? view.believed->T_world_camera : view.T_world_camera;
+}
+
+std::int64_t fewest_pixels(const Scan& scan, std::size_t objects) {
+  std::vector<std::int64_t> pixels(objects, 0);
+  for (const std::uint8_t label : scan.labels.pixels)
+    if (label >= 2) ++pixels[label - 2u];
+  return *std::min_element(pixels.begin(), pixels.end());
+}
+
+// As dofusion-place does: sampled, settled, and ranked by how probably they stand in what the scene may really be.
+std::vector<Placement> place_ranked(const RecoveredScene& recovered, const ObjectPtr& query,
+                                    const PlacementModel& model, const PlacementOptions& options) {
+  std::vector<Placement> placements = place(recovered.scene, query, model, options);
+  stop_if_interrupted();
+  const SceneSampler scenes(recovered, options.physics, {}, options.seed);
+  RankingOptions ranking;
+  ranking.seed = options.seed;
+  rank_by_probability(scenes, query, ranking, placements);
+  return placements;
+}
+
+// The first placement, in the recovered scene and put into the true one.
+void settle_in_both(const StudyScene& scene, const std::vector<Placement>& placements, StudyTrial& trial) {
+  StudyRow& row = trial.row;
+  row.candidates_stable = static_cast<int>(
+      std::count_if(placements.begin(), placements.end(), [](const Placement& p) { return p.stable; }));
+  trial.best = placements.front();
+  const Outcome seen = outcome_of(*trial.best);
+  row.displacement_recovered_pct = seen.pct;
+  row.displacement_recovered_deg = seen.deg;
+  row.stable_recovered = seen.stable;
+  Placement put = settle_at(scene.truth, scene.query, trial.T_true_recovered * trial.best->T_world_query);
+  const Outcome real = outcome_of(put);
+  row.displacement_true_pct = real.pct;
+  row.displacement_true_deg = real.deg;
+  row.stable_true = real.stable;
+  trial.settled_true = std::move(put.settled);
 }
 
 }  // namespace
@@ -156,20 +196,29 @@ struct StudyRunner::Impl {
     return options;
   }
 
-  // The same viewing direction in all trials of a scene.
-  SyntheticView scan(const StudyScene& scene, const StudyCondition& condition, double noise_scale) const {
+  // The same viewing directions in all trials of a scene.
+  std::vector<SyntheticView> scan(const StudyScene& scene, const StudyCondition& condition, double noise_scale) const {
     SyntheticViewOptions options;
     options.viewpoint.distance = condition.distance_m;
     options.sensor = condition.sensor;
     options.noise_scale = noise_scale;
-    Rng rng = make_rng(seed ^ kViewSeed, static_cast<std::uint64_t>(scene.index));
-    return make_synthetic_view(scene.truth, default_camera(), options, rng);
+    options.miscalibration.rotation_deg = condition.pose_error_deg;
+    options.miscalibration.translation = 1e-3 * condition.pose_error_mm;
+    std::vector<SyntheticView> views;
+    for (int v = 0; v < condition.views; ++v) {
+      const std::uint64_t view_seed = seed ^ kViewSeed ^ (static_cast<std::uint64_t>(v) << 56);
+      Rng rng = make_rng(view_seed, static_cast<std::uint64_t>(scene.index));
+      views.push_back(make_synthetic_view(scene.truth, default_camera(), options, rng));
+    }
+    return views;
   }
 
-  RecoveredScene recover(const SyntheticView& view, bool known) const {
+  RecoveredScene recover(const std::vector<SyntheticView>& seen, bool known) const {
     SceneRecoveryOptions options;
     if (known) options.library = library;
-    return recover_scene(view.depth, default_camera(), options);
+    std::vector<View> views;
+    for (const SyntheticView& view : seen) views.push_back({view.depth, default_camera(), believed_pose(view), {}});
+    return recover_scene(views, options);
   }
 };
 
@@ -219,15 +268,44 @@ StudyRow StudyRunner::reference_row(const StudyScene& scene) const {
 
   Rng rng = make_rng(impl_->seed ^ kRandomSeed, static_cast<std::uint64_t>(scene.index));
   const Outcome random =
-      settle_at(scene.truth, scene.query, random_placement(scene.truth, *scene.query, scene.task, rng));
+      outcome_of(settle_at(scene.truth, scene.query, random_placement(scene.truth, *scene.query, scene.task, rng)));
   row.displacement_random_pct = random.pct;
   row.displacement_random_deg = random.deg;
   row.stable_random = random.stable;
   return row;
 }
 
-StudyRow StudyRunner::run(const StudyScene& scene, std::int64_t trial, StudyRow row) const {
+StudyTrial StudyRunner::run(const StudyScene& scene, std::int64_t trial, const StudyRow& reference) const {
   stop_if_interrupted();
+  StudyTrial result;
+  StudyRow& row = result.row = reference;
+  const StudyCondition& condition = set_condition(trial, row);
+  result.views = impl_->scan(scene, condition, row.noise_scale);
+  row.fewest_pixels = fewest_pixels(result.views.front().truth, scene.truth.objects.size());
+  stop_if_interrupted();
+
+  Stopwatch watch;
+  result.recovered = impl_->recover(result.views, condition.known);
+  row.ms_recover = watch.lap_ms();
+  stop_if_interrupted();
+  if (result.recovered.table) {
+    // A robot has poses relative to its camera: what it believes of the camera links the recovered world with the true
+    // one.
+    result.T_true_recovered = believed_pose(result.views.front()) * result.recovered.table->T_world_camera.inverse();
+    measure_table(result.T_true_recovered, row);
+    measure_recovery(scene.truth, transformed(result.T_true_recovered, result.recovered.scene), row.known, row);
+    watch.lap_ms();
+    const std::vector<Placement> placements =
+        place_ranked(result.recovered, scene.query, impl_->models.of(condition), impl_->placement_options(scene.index));
+    row.ms_place = watch.lap_ms();
+    settle_in_both(scene, placements, result);
+  }
+  row.failure = first_failure(row);
+  return result;
+}
+
+// Which of its scene's trials it is.
+const StudyCondition& StudyRunner::set_condition(std::int64_t trial, StudyRow& row) const {
   const std::vector<double>& scales = impl_->config.noise_scales;
   const auto of_scene = static_cast<std::size_t>(trial % impl_->config.trials_per_scene());
   row.trial = trial;
@@ -236,44 +314,11 @@ StudyRow StudyRunner::run(const StudyScene& scene, std::int64_t trial, StudyRow 
   const StudyCondition& condition = impl_->config.series[static_cast<std::size_t>(row.series)];
   row.sensor = to_string(condition.sensor);
   row.distance_m = condition.distance_m;
+  row.views = condition.views;
+  row.pose_error_deg = condition.pose_error_deg;
+  row.pose_error_mm = condition.pose_error_mm;
   row.known = condition.known;
-
-  const SyntheticView view = impl_->scan(scene, condition, row.noise_scale);
-  std::vector<std::int64_t> pixels(scene.truth.objects.size(), 0);
-  for (const std::uint8_t label : view.truth.labels.pixels) {
-    if (label >= 2) ++pixels[label - 2u];
-  }
-  row.fewest_pixels = *std::min_element(pixels.begin(), pixels.end());
-  stop_if_interrupted();
-
-  Stopwatch watch;
-  const RecoveredScene recovered = impl_->recover(view, condition.known);
-  row.ms_recover = watch.lap_ms();
-  stop_if_interrupted();
-  if (recovered.table) {
-    // A robot has poses relative to its camera: the camera links the recovered world with the true one.
-    const Pose T_true_recovered = view.T_world_camera * recovered.table->T_world_camera.inverse();
-    measure_table(T_true_recovered, row);
-    measure_recovery(scene.truth, transformed(T_true_recovered, recovered.scene), row.known, row);
-
-    watch.lap_ms();
-    const std::vector<Placement> placements =
-        place(recovered.scene, scene.query, impl_->models.of(condition), impl_->placement_options(scene.index));
-    row.ms_place = watch.lap_ms();
-    row.candidates_stable = static_cast<int>(
-        std::count_if(placements.begin(), placements.end(), [](const Placement& p) { return p.stable; }));
-    const Placement& best = placements.front();
-    const Outcome seen = outcome_of(best);
-    row.displacement_recovered_pct = seen.pct;
-    row.displacement_recovered_deg = seen.deg;
-    row.stable_recovered = seen.stable;
-    const Outcome real = settle_at(scene.truth, scene.query, T_true_recovered * best.T_world_query);
-    row.displacement_true_pct = real.pct;
-    row.displacement_true_deg = real.deg;
-    row.stable_true = real.stable;
-  }
-  row.failure = first_failure(row);
-  return row;
+  return condition;
 }
 
 std::vector<ObjectPtr> load_block_library() {

@@ -4,12 +4,16 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "apps/pipeline.h"
+#include "apps/placement.h"
 #include "apps/study_config.h"
 #include "apps/study_rows.h"
 #include "diffusion/sampler.h"
+#include "perception/synthetic_view.h"
 #include "stability/scene.h"
 
 namespace dofusion {
@@ -20,6 +24,16 @@ struct StudyScene {
   Task task = Task::kSingle;
   Scene truth;  // without the query
   ObjectPtr query;
+};
+
+// A trial's row and what it was made from, for pictures.
+struct StudyTrial {
+  StudyRow row;
+  std::vector<SyntheticView> views;
+  RecoveredScene recovered;
+  std::optional<Placement> best;   // the placement that was taken; none without a table
+  std::vector<Pose> settled_true;  // the true scene's objects and then the query, at rest after it was put there
+  Pose T_true_recovered = Pose::Identity();  // the recovered world in the true one, as the robot believes
 };
 
 // The model file of a condition.
@@ -40,8 +54,7 @@ class StudyModels {
 class StudyRunner {
  public:
   // `library`: the objects that the known ones are looked for among. `models` must live as long as the runner.
-  StudyRunner(const StudyConfig& config, std::uint64_t seed, const StudyModels& models,
-              std::vector<ObjectPtr> library);
+  StudyRunner(const StudyConfig& config, std::uint64_t seed, const StudyModels& models, std::vector<ObjectPtr> library);
   ~StudyRunner();
 
   StudyScene make_scene(std::int64_t index);
@@ -50,9 +63,11 @@ class StudyRunner {
   StudyRow reference_row(const StudyScene& scene) const;
 
   // Scan, recover, place, and settle in both scenes: completes the scene's reference row.
-  StudyRow run(const StudyScene& scene, std::int64_t trial, StudyRow reference) const;
+  StudyTrial run(const StudyScene& scene, std::int64_t trial, const StudyRow& reference) const;
 
  private:
+  const StudyCondition& set_condition(std::int64_t trial, StudyRow& row) const;
+
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

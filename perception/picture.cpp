@@ -161,6 +161,29 @@ Camera resized(const Camera& camera, double factor) {
   return result;
 }
 
+Camera zoomed_on(const Camera& camera, const Pose& T_world_camera, const std::vector<Scene>& shown, int width) {
+  Eigen::AlignedBox2d seen;
+  const Pose T_camera_world = T_world_camera.inverse();
+  for (const Scene& scene : shown) {
+    for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+      for (const Eigen::Vector3d& v : scene.objects[i]->mesh.vertices) {
+        const Eigen::Vector3d p = T_camera_world * (scene.T_world_object[i] * v);
+        if (p.z() > 0.01) seen.extend(project(camera, p));
+      }
+    }
+  }
+  if (seen.isEmpty()) return resized(camera, static_cast<double>(width) / camera.width);
+  const double zoom = width / std::max({seen.sizes().x() * 1.5, seen.sizes().y() * 1.5 * 4.0 / 3.0, 80.0});
+  Camera result = camera;
+  result.width = width;
+  result.height = width * 3 / 4;
+  result.fx *= zoom;
+  result.fy *= zoom;
+  result.cx = (camera.cx - seen.center().x()) * zoom + result.width / 2.0;
+  result.cy = (camera.cy - seen.center().y()) * zoom + result.height / 2.0;
+  return result;
+}
+
 std::string to_png(const ColourImage& image) {
   if (image.pixels.empty()) throw std::invalid_argument("a picture without pixels");
   return encode_rgb_png(image.pixels.front().data(), image.width, image.height);

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "perception/camera.h"
 #include "perception/geom_scanner.h"
@@ -48,6 +49,10 @@ ColourImage segmentation_picture(const LabelImage& labels, const DepthImage& dep
 
 // A picture with the same sight at another size, for instance half a sensor's for a report.
 Camera resized(const Camera& camera, double factor);
+
+// The same camera with its sight narrowed to what it sees of the scenes, with a border: `width` pixels wide, 4 to 3. If
+// it sees nothing of them, its whole image in that width.
+Camera zoomed_on(const Camera& camera, const Pose& T_world_camera, const std::vector<Scene>& shown, int width);
 
 std::string to_png(const ColourImage& image);  // the file's bytes; throws std::invalid_argument without pixels
 void write_picture(const ColourImage& image, const std::string& path);  // throws InputError naming the file

@@ -7,7 +7,7 @@ bash apps/install_packages.sh
 cmake --preset ci >/dev/null
 cmake --build --preset ci
 ctest --preset ci -j "$(nproc)" --timeout 900
-# The readers of files against a fuzzer, a few seconds each: tests/fuzz.
+# The readers of files against a fuzzer, a minute each: tests/fuzz.
 cmake -S . -B build/fuzz -G Ninja -DCMAKE_BUILD_TYPE=None -DCMAKE_C_COMPILER=clang -DCMAKE_CXX_COMPILER=clang++ \
   -DDOFUSION_FUZZ=ON -DDOFUSION_WERROR=ON >/dev/null
 cmake --build build/fuzz

@@ -43,7 +43,7 @@ TEST_F(StudyProgramTest, LeavesItsFilesAndNothingElse) {
   command.insert(command.end(), {"--json", directory_ / "summary.json"});
   expect_success(RunningCommand(command).wait());
   EXPECT_EQ(entries(directory_ / "plain"), (std::vector<std::string>{"displacement.svg", "report.html", "series.svg",
-                                                                     "success.svg", "summary.json", "trials.csv"}));
+                                                                     "success.svg", "summary.json", "trials.csv", "worst.html"}));
   EXPECT_EQ(entries(directory_.path()), (std::vector<std::string>{"plain", "study.json", "summary.json"}));
   const auto summary = nlohmann::json::parse(read_file(directory_ / "summary.json"));
   EXPECT_EQ(summary, nlohmann::json::parse(read_file(directory_ / "plain/summary.json")));

@@ -9,8 +9,10 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/assets.h"
+#include "apps/study_cases.h"
 #include "apps/study_figures.h"
 #include "apps/study_report.h"
+#include "apps/study_runner.h"
 #include "stability/files.h"
 #include "tests/temporary_directory.h"
 
@@ -101,10 +103,10 @@ TEST(StudyConfig, DefaultsAndOwnValues) {
 TEST(StudyConfig, ASeriesSaysWhatDiffersFromTheFirst) {
   const StudyConfig config = study_config_from_json(
       R"({"sensor": "kinect", "distance_m": 1, "noise_scales": [0, 1],
-          "series": [{"known": false}, {"sensor": "azure", "distance_m": 0.5}]})",
+          "series": [{"known": false}, {"sensor": "azure", "distance_m": 0.5}, {"views": 3, "pose_error": [0.2, 1.5]}]})",
       "study.json");
-  ASSERT_EQ(config.series.size(), 3u);
-  EXPECT_EQ(config.trials_per_scene(), 6);
+  ASSERT_EQ(config.series.size(), 4u);
+  EXPECT_EQ(config.trials_per_scene(), 8);
   EXPECT_EQ(config.series[1].sensor, SensorModel::kKinect);
   EXPECT_EQ(config.series[1].distance_m, 1.0);
   EXPECT_FALSE(config.series[1].known);
@@ -113,6 +115,10 @@ TEST(StudyConfig, ASeriesSaysWhatDiffersFromTheFirst) {
   EXPECT_EQ(series_title(config, 0), "known objects, the first Kinect, at 1 m");
   EXPECT_EQ(series_title(config, 1), "unknown objects");
   EXPECT_EQ(series_title(config, 2), "the Azure Kinect, at 0.5 m");
+  EXPECT_EQ(config.series[3].views, 3);
+  EXPECT_EQ(config.series[3].pose_error_deg, 0.2);
+  EXPECT_EQ(config.series[3].pose_error_mm, 1.5);
+  EXPECT_EQ(series_title(config, 3), "3 views, camera poses off by 0.2° and 1.5 mm");
 }
 
 TEST(StudyConfig, ErrorsNameFileAndField) {
@@ -128,6 +134,11 @@ TEST(StudyConfig, ErrorsNameFileAndField) {
       {R"({"distance_m": "far"})", "distance_m"},
       {R"({"distance_m": 0})", "distance_m"},
       {R"({"known": 1})", "known"},
+      {R"({"views": 0})", "views"},
+      {R"({"views": 9})", "views"},
+      {R"({"pose_error": [1]})", "pose_error"},
+      {R"({"pose_error": [-1, 0]})", "pose_error"},
+      {R"({"series": [{"pose_error": [0.1, 2, 3]}]})", "series[0].pose_error"},
       {R"({"samples": 0})", "samples"},
       {R"({"steps": 1.5})", "steps"},
       {R"({"model": ""})", "model"},
@@ -186,6 +197,28 @@ TEST(FirstFailure, NamesTheFirstStepThatWentWrong) {
   row = made_up_row(0, 1.0);
   row.stable_true = false;
   EXPECT_EQ(first_failure(row), "placement");
+}
+
+// Of each kind the ones at the sensor's own noise first, then the larger displacement, a scene but once.
+TEST(WorstCases, AreTheNearestToOwnNoiseInWhichMostMoved) {
+  std::vector<StudyRow> rows;
+  const auto add = [&](std::int64_t scene, double scale, std::optional<double> moved, const std::string& failure) {
+    StudyRow row = made_up_row(static_cast<std::int64_t>(rows.size()), scale);
+    row.scene = scene;
+    row.displacement_true_pct = moved;
+    row.failure = failure;
+    rows.push_back(row);
+  };
+  add(0, 1.0, 90.0, "placement");
+  add(0, 1.0, 80.0, "placement");  // the same scene again
+  add(1, 4.0, 95.0, "placement");
+  add(2, 1.0, 20.0, "placement");
+  add(3, 1.0, {}, "placement");  // diverged: more than any
+  add(4, 0.0, 99.0, "shape");
+  add(5, 1.0, 0.1, "");
+  std::vector<std::int64_t> trials;
+  for (const StudyRow& row : worst_cases(rows, 3)) trials.push_back(row.trial);
+  EXPECT_EQ(trials, (std::vector<std::int64_t>{5, 4, 0, 3}));
 }
 
 TEST(PartialRows, GoOnAfterACutLine) {
@@ -265,8 +298,8 @@ TEST(StudySummary, IsWhatAHandWorksOut) {
 }
 
 TEST(StudySummary, SeriesAreApart) {
-  const StudyConfig config = study_config_from_json(
-      R"({"noise_scales": [0, 1], "series": [{"known": false}]})", "study.json");
+  const StudyConfig config =
+      study_config_from_json(R"({"noise_scales": [0, 1], "series": [{"known": false}]})", "study.json");
   std::vector<StudyRow> rows = four_rows();
   for (StudyRow& row : rows) {
     row.series = row.scene == 0 ? 0 : 1;
@@ -381,6 +414,40 @@ TEST(Study, SeriesShareScenesAndReferences) {
     EXPECT_EQ(rows[i].displacement_ground_truth_pct, rows[i / 2 * 2].displacement_ground_truth_pct);
     EXPECT_EQ(rows[i].fewest_pixels, rows[i / 2 * 2].fewest_pixels);  // from the same place
   }
+  const std::string page = cases_html(job, {rows[1]});
+  EXPECT_THAT(page, AllOf(HasSubstr("Trial 1: unknown objects"), HasSubstr("The true scene, placed so")));
+}
+
+// More views see better; where the robot is wrong about its camera, its placement is off by as much.
+TEST(Study, ViewsAndWrongCameraPosesCount) {
+  if (!std::filesystem::exists(test_model())) GTEST_SKIP() << "no model at " << test_model();
+  StudyConfig config;
+  config.series[0].model = test_model();
+  config.series.push_back(config.series[0]);
+  config.series[1].views = 3;
+  config.series.push_back(config.series[0]);
+  config.series[2].pose_error_mm = 20.0;
+  config.noise_scales = {1.0};
+  config.samples = 2;
+  config.steps = 10;
+  const StudyModels models(config);
+  StudyRunner runner(config, 8, models, load_block_library());
+  const StudyScene scene = runner.make_scene(0);
+  const StudyRow reference = runner.reference_row(scene);
+  const StudyTrial one = runner.run(scene, 0, reference), three = runner.run(scene, 1, reference),
+                   wrong = runner.run(scene, 2, reference);
+  ASSERT_EQ(one.views.size(), 1u);
+  ASSERT_EQ(three.views.size(), 3u);
+  EXPECT_TRUE(three.views[0].T_world_camera.isApprox(one.views[0].T_world_camera));
+  EXPECT_GT((three.views[1].T_world_camera.translation() - three.views[0].T_world_camera.translation()).norm(), 0.05);
+  EXPECT_EQ(three.row.views, 3);
+  ASSERT_TRUE(three.best);
+  EXPECT_EQ(three.row.objects_found, three.row.objects_true);
+
+  EXPECT_EQ(wrong.row.pose_error_mm, 20.0);
+  ASSERT_TRUE(wrong.row.table_offset_mm && one.row.table_offset_mm && wrong.row.position_error_max_mm);
+  EXPECT_LT(*one.row.position_error_max_mm, 2.0);
+  EXPECT_GT(*wrong.row.position_error_max_mm, 5.0);
 }
 
 }  // namespace

@@ -111,6 +111,19 @@ TEST(Picture, ResizedCameraSeesTheSame) {
   EXPECT_LT((0.5 * (whole_pixel + Eigen::Vector2d(0.5, 0.5)) - (half_pixel + Eigen::Vector2d(0.5, 0.5))).norm(), 1e-10);
 }
 
+TEST(Picture, ZoomedCameraFramesTheScene) {
+  const Scene scene = one_cube();
+  const Camera close = zoomed_on(kCamera, view(), {scene}, 200);
+  EXPECT_EQ(close.width, 200);
+  EXPECT_EQ(close.height, 150);
+  EXPECT_GT(close.fx, kCamera.fx);
+  for (const Eigen::Vector3d& v : scene.objects[0]->mesh.vertices) {
+    const Eigen::Vector2d pixel = project(close, view().inverse() * (scene.T_world_object[0] * v));
+    EXPECT_TRUE(pixel.x() > 10 && pixel.x() < 190 && pixel.y() > 10 && pixel.y() < 140) << pixel.transpose();
+  }
+  EXPECT_EQ(zoomed_on(kCamera, view(), {}, 80).fx, 150.0);
+}
+
 TEST(Picture, PngIsAnRgbImageOfTheSize) {
   const TemporaryDirectory directory;
   const ColourImage picture(7, 5, {10, 20, 30});
