@@ -86,23 +86,13 @@ bool too_few(const Wishes& wishes, const std::vector<Placement>& placements) {
                        [](const Placement& p) { return p.stable && p.unmet.empty(); }) < kEnough;
 }
 
-// The sampler's options, steered towards what is wished.
+// The sampler's options, steered towards what is wished and what is estimated.
 PlacementOptions with_wishes(const PlaceArguments& arguments, const WishScene& scene,
                              const std::optional<Pose>& T_world_estimate) {
   PlacementOptions options = arguments.placement;
-  options.guides = guides(arguments.wishes, scene);
   options.start = T_world_estimate;
   if (T_world_estimate) options.start_sigma = arguments.refine_noise;
-  options.centre = wished_centre(arguments.wishes, scene);
-  if (arguments.wishes.on_object) options.anchor = static_cast<std::size_t>(*arguments.wishes.on_object);
-  if (T_world_estimate && !options.centre) options.centre = T_world_estimate->translation().head<2>();
-  if (!options.anchor && options.centre && !scene.scene.objects.empty()) {
-    const std::vector<Pose>& poses = scene.scene.T_world_object;
-    const auto distance = [&](const Pose& pose) { return (pose.translation().head<2>() - *options.centre).norm(); };
-    const auto nearest = std::min_element(poses.begin(), poses.end(),
-                                          [&](const Pose& a, const Pose& b) { return distance(a) < distance(b); });
-    options.anchor = static_cast<std::size_t>(nearest - poses.begin());
-  }
+  steer(arguments.wishes, scene, options);
   return options;
 }
 

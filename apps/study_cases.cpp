@@ -80,11 +80,13 @@ std::string description(const StudyConfig& config, const StudyRow& row) {
   std::replace(context.begin(), context.end(), '+', ',');
   std::string text = "Trial " + std::to_string(row.trial) + ": " +
                      series_title(config, static_cast<std::size_t>(row.series)) + "; noise scale " +
-                     plain(row.noise_scale) + "; on the table: " + context + "; to place: " + row.query + ". ";
+                     plain(row.noise_scale) + "; on the table: " + context + "; to place: " + row.query +
+                     (row.on_top ? ", on top" : "") + ". ";
   if (!row.objects_found) return text + "No table was found.";
   text += std::to_string(*row.objects_found) + " objects found of " + std::to_string(row.objects_true);
   if (row.shapes_right) text += ", " + std::to_string(*row.shapes_right) + " of the right shape";
   if (row.position_error_max_mm) text += ", the worst off by " + rounded(*row.position_error_max_mm) + " mm";
+  if (!row.stable_recovered) return text + ". No candidate was as wished.";
   text += ". In the recovered scene the placement " +
           std::string(row.stable_recovered.value_or(false) ? "stands; " : "falls; ");
   if (!row.displacement_true_pct) return text + "in the true one the simulation diverged.";

@@ -97,6 +97,7 @@ StudyTask task_from_json(const json& entry, const std::string& source, const std
   const bool single = task.task == Task::kSingle;
   fields.take<int>("objects", task.objects, single ? "1 for single" : "2 to 6 for stack and unstructured",
                    [&](const int& n) { return single ? n == 1 : n >= 2 && n <= 6; });
+  fields.take<bool>("on_top", task.on_top, "true or false");
   if (!has_objects && !single) throw InputError(source + ": '" + name + ".objects' is missing");
   fields.finish();
   return task;
@@ -203,7 +204,7 @@ StudyConfig read_study_config(const std::string& path) {
 nlohmann::ordered_json to_json(const StudyConfig& config) {
   nlohmann::ordered_json tasks = nlohmann::ordered_json::array();
   for (const StudyTask& task : config.tasks) {
-    tasks.push_back({{"task", to_string(task.task)}, {"objects", task.objects}});
+    tasks.push_back({{"task", to_string(task.task)}, {"objects", task.objects}, {"on_top", task.on_top}});
   }
   nlohmann::ordered_json series = nlohmann::ordered_json::array();
   for (const StudyCondition& condition : config.series) series.push_back(to_json(condition));

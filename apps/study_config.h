@@ -16,6 +16,7 @@ namespace dofusion {
 struct StudyTask {
   Task task = Task::kSingle;
   int objects = 1;
+  bool on_top = false;  // the query is wished on the object that reaches highest, and off the table
 };
 
 // How the scenes are looked at, and what is known of them.

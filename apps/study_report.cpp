@@ -31,6 +31,7 @@ std::string tasks_text(const StudyConfig& config) {
     else
       list += std::to_string(task.objects) +
               (task.task == Task::kStack ? " stacked blocks" : " blocks touching or side by side");
+    if (task.on_top) list += " with one more wished on top";
   }
   return list;
 }

@@ -27,6 +27,7 @@ void for_each_column(Row& row, Visit visit) {
   visit("task", row.task);
   visit("context", row.context);
   visit("query", row.query);
+  visit("on_top", row.on_top);
   visit("objects_true", row.objects_true);
   visit("fewest_pixels", row.fewest_pixels);
   visit("objects_found", row.objects_found);

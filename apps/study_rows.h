@@ -26,6 +26,7 @@ struct StudyRow {
   std::string task;
   std::string context;  // the blocks on the table, "cube+hat"
   std::string query;    // the block to place
+  bool on_top = false;  // wished on the object that reaches highest, and off the table
   int objects_true = 0;
   std::int64_t fewest_pixels = 0;  // that an object of the true scene shows to the first camera
   std::optional<int> objects_found;
@@ -38,7 +39,7 @@ struct StudyRow {
   std::optional<double> pose_error_max_pct;
   std::optional<double> table_angle_deg;  // between true and recovered table
   std::optional<double> table_offset_mm;  // between them, along the normal, where the optical axis meets the table
-  std::optional<int> candidates_stable;   // in the recovered scene
+  std::optional<int> candidates_stable;   // in the recovered scene, and as wished
   // The best-ranked placement, settled: in the recovered scene, and at the same pose in the robot's frame in the true
   // one.
   std::optional<double> displacement_recovered_pct, displacement_recovered_deg;
@@ -61,7 +62,7 @@ struct StudyRow {
 //   segmentation  another number of objects was recovered than there is
 //   shape         a known object was taken for another
 //   pose          an object is off by more than kPoseErrorPct of its diameter
-//   placement     none of these: the scene was recovered well and still nothing stands
+//   placement     none of these: the scene was recovered well and still nothing stands, or nothing was as wished
 std::string first_failure(const StudyRow& row);
 inline constexpr double kPoseErrorPct = 5.0;      // half of what a stable object may move
 const std::vector<std::string>& failure_names();  // in the order above

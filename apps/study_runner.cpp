@@ -9,6 +9,7 @@
 #include "apps/ranking.h"
 #include "apps/stopwatch.h"
 #include "apps/uncertainty.h"
+#include "apps/wishes.h"
 #include "stability/generation.h"
 #include "stability/mesh_io.h"
 #include "stability/shapes.h"
@@ -106,8 +107,10 @@ struct Outcome {
   bool stable = false;
 };
 
+// A placement that is not what was wished is not carried out: it has no outcome.
 Outcome outcome_of(const Placement& placement) {
   Outcome outcome;
+  if (!placement.unmet.empty()) return outcome;
   outcome.stable = placement.stable;
   if (placement.status == SettleStatus::kDiverged) return outcome;
   outcome.pct = placement.displacement.translation_pct;
@@ -134,10 +137,44 @@ std::int64_t fewest_pixels(const Scan& scan, std::size_t objects) {
   return *std::min_element(pixels.begin(), pixels.end());
 }
 
-// As dofusion-place does: sampled, settled, and ranked by how probably they stand in what the scene may really be.
-std::vector<Placement> place_ranked(const RecoveredScene& recovered, const ObjectPtr& query,
+std::size_t highest_object(const Scene& scene) {
+  const auto top = [&](std::size_t i) {
+    double z = 0.0;
+    for (const Eigen::Vector3d& v : scene.objects[i]->mesh.vertices) z = std::max(z, (scene.T_world_object[i] * v).z());
+    return z;
+  };
+  std::size_t highest = 0;
+  for (std::size_t i = 1; i < scene.objects.size(); ++i)
+    if (top(i) > top(highest)) highest = i;
+  return highest;
+}
+
+// The object of `scene` nearest to where the wished one stands in truth; none in an empty scene.
+std::optional<int> nearest_object(const Scene& scene, const Eigen::Vector3d& point) {
+  std::optional<int> nearest;
+  const auto distance = [&](int i) {
+    return (scene.T_world_object[static_cast<std::size_t>(i)].translation() - point).norm();
+  };
+  for (int i = 0; i < static_cast<int>(scene.objects.size()); ++i)
+    if (!nearest || distance(i) < distance(*nearest)) nearest = i;
+  return nearest;
+}
+
+// Sampled and settled, each with the wishes that it does not meet.
+std::vector<Placement> place_with_wishes(const Scene& scene, const ObjectPtr& query, const Wishes& wishes,
+                                         const PlacementModel& model, PlacementOptions options) {
+  const WishScene wished{scene, query, default_camera(), Pose::Identity()};
+  steer(wishes, wished, options);
+  std::vector<Placement> placements = place(scene, query, model, options);
+  for (Placement& placement : placements) placement.unmet = unmet(wishes, wished, placement);
+  std::stable_partition(placements.begin(), placements.end(), [](const Placement& p) { return p.unmet.empty(); });
+  return placements;
+}
+
+// As dofusion-place does: ranked by how probably they stand in what the scene may really be.
+std::vector<Placement> place_ranked(const RecoveredScene& recovered, const ObjectPtr& query, const Wishes& wishes,
                                     const PlacementModel& model, const PlacementOptions& options) {
-  std::vector<Placement> placements = place(recovered.scene, query, model, options);
+  std::vector<Placement> placements = place_with_wishes(recovered.scene, query, wishes, model, options);
   stop_if_interrupted();
   const SceneSampler scenes(recovered, options.physics, {}, options.seed);
   RankingOptions ranking;
@@ -149,9 +186,10 @@ std::vector<Placement> place_ranked(const RecoveredScene& recovered, const Objec
 // The first placement, in the recovered scene and put into the true one.
 void settle_in_both(const StudyScene& scene, const std::vector<Placement>& placements, StudyTrial& trial) {
   StudyRow& row = trial.row;
-  row.candidates_stable = static_cast<int>(
-      std::count_if(placements.begin(), placements.end(), [](const Placement& p) { return p.stable; }));
+  row.candidates_stable = static_cast<int>(std::count_if(
+      placements.begin(), placements.end(), [](const Placement& p) { return p.stable && p.unmet.empty(); }));
   trial.best = placements.front();
+  if (!trial.best->unmet.empty()) return;
   const Outcome seen = outcome_of(*trial.best);
   row.displacement_recovered_pct = seen.pct;
   row.displacement_recovered_deg = seen.deg;
@@ -246,6 +284,7 @@ StudyScene StudyRunner::make_scene(std::int64_t index) {
   scene.task = impl_->config.tasks[task].task;
   scene.truth = to_scene(shapes, generator.generate(index));
   Rng rng = make_rng(impl_->seed ^ kQuerySeed, static_cast<std::uint64_t>(index));
+  if (impl_->config.tasks[task].on_top) scene.on = highest_object(scene.truth);
   const int query = uniform_int(rng, 0, static_cast<int>(shapes.shapes.size()) - 1);
   scene.query = shapes.shapes[static_cast<std::size_t>(query)];
   return scene;
@@ -259,8 +298,11 @@ StudyRow StudyRunner::reference_row(const StudyScene& scene) const {
   row.query = scene.query->name;
   row.objects_true = static_cast<int>(scene.truth.objects.size());
 
-  const std::vector<Placement> informed =
-      place(scene.truth, scene.query, impl_->models.of(impl_->config.base()), impl_->placement_options(scene.index));
+  row.on_top = scene.on.has_value();
+  Wishes wishes;
+  if (scene.on) wishes.on_object = static_cast<int>(*scene.on);
+  const std::vector<Placement> informed = place_with_wishes(
+      scene.truth, scene.query, wishes, impl_->models.of(impl_->config.base()), impl_->placement_options(scene.index));
   const Outcome best = outcome_of(informed.front());
   row.displacement_ground_truth_pct = best.pct;
   row.displacement_ground_truth_deg = best.deg;
@@ -295,8 +337,13 @@ StudyTrial StudyRunner::run(const StudyScene& scene, std::int64_t trial, const S
     measure_table(result.T_true_recovered, row);
     measure_recovery(scene.truth, transformed(result.T_true_recovered, result.recovered.scene), row.known, row);
     watch.lap_ms();
-    const std::vector<Placement> placements =
-        place_ranked(result.recovered, scene.query, impl_->models.of(condition), impl_->placement_options(scene.index));
+    Wishes wishes;
+    if (scene.on) {
+      const Eigen::Vector3d there = scene.truth.T_world_object[*scene.on].translation();
+      wishes.on_object = nearest_object(result.recovered.scene, result.T_true_recovered.inverse() * there);
+    }
+    const std::vector<Placement> placements = place_ranked(
+        result.recovered, scene.query, wishes, impl_->models.of(condition), impl_->placement_options(scene.index));
     row.ms_place = watch.lap_ms();
     settle_in_both(scene, placements, result);
   }

@@ -24,6 +24,7 @@ struct StudyScene {
   Task task = Task::kSingle;
   Scene truth;  // without the query
   ObjectPtr query;
+  std::optional<std::size_t> on;  // the object that the query is wished on, of the true scene
 };
 
 // A trial's row and what it was made from, for pictures.

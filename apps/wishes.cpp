@@ -152,6 +152,19 @@ std::optional<Eigen::Vector2d> wished_centre(const Wishes& wishes, const WishSce
   return std::nullopt;
 }
 
+void steer(const Wishes& wishes, const WishScene& scene, PlacementOptions& options) {
+  options.guides = guides(wishes, scene);
+  options.centre = wished_centre(wishes, scene);
+  if (options.start && !options.centre) options.centre = options.start->translation().head<2>();
+  if (wishes.on_object) options.anchor = static_cast<std::size_t>(*wishes.on_object);
+  if (options.anchor || !options.centre || scene.scene.objects.empty()) return;
+  const std::vector<Pose>& poses = scene.scene.T_world_object;
+  const auto distance = [&](const Pose& pose) { return (pose.translation().head<2>() - *options.centre).norm(); };
+  const auto nearest = std::min_element(poses.begin(), poses.end(),
+                                        [&](const Pose& a, const Pose& b) { return distance(a) < distance(b); });
+  options.anchor = static_cast<std::size_t>(nearest - poses.begin());
+}
+
 std::vector<std::string> unmet(const Wishes& wishes, const WishScene& scene, const Placement& placement) {
   std::vector<std::string> names;
   const Pose& pose = placement.T_world_query;

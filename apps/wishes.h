@@ -42,6 +42,9 @@ struct WishScene {
 // Costs for the sampler. Clearance steers only where it is known what the query rests on: with on_table or on_object.
 std::vector<PoseCostPtr> guides(const Wishes& wishes, const WishScene& scene);
 
+// Steers the sampler's options towards what is wished: the costs above, where the search begins, what it looks at.
+void steer(const Wishes& wishes, const WishScene& scene, PlacementOptions& options);
+
 // Where the search is best begun: the middle of what is asked for; nullopt if nothing says where.
 std::optional<Eigen::Vector2d> wished_centre(const Wishes& wishes, const WishScene& scene);
 

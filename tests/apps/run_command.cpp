@@ -1,10 +1,13 @@
 #include "tests/apps/run_command.h"
 
 #include <algorithm>
+#include <chrono>
 #include <csignal>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <stdexcept>
+#include <thread>
 
 #include <fcntl.h>
 #include <sys/resource.h>
@@ -32,6 +35,15 @@ constexpr rlim_t kProcessorSeconds = 600;
   ::_exit(127);
 }
 
+// By the mask of caught signals that Linux shows of a process.
+bool catches(pid_t process, int signal_number) {
+  std::ifstream status("/proc/" + std::to_string(process) + "/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.rfind("SigCgt:", 0) == 0) return (std::stoull(line.substr(7), nullptr, 16) >> (signal_number - 1)) & 1u;
+  }
+  return true;  // it has ended
+}
+
 }  // namespace
 
 RunningCommand::RunningCommand(std::vector<std::string> words, const CommandOptions& options)
@@ -55,7 +67,10 @@ RunningCommand::~RunningCommand() {
 }
 
 void RunningCommand::send(int signal_number) const {
-  if (child_ > 0) ::kill(child_, signal_number);
+  if (child_ <= 0) return;
+  for (int tries = 0; signal_number == SIGINT && tries < 300 && !catches(child_, signal_number); ++tries)
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  ::kill(child_, signal_number);
 }
 
 bool RunningCommand::ended() {

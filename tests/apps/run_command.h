@@ -31,6 +31,7 @@ class RunningCommand {
   explicit RunningCommand(std::vector<std::string> words, const CommandOptions& options = {});
   ~RunningCommand();
 
+  // SIGINT waits until the program catches it, at most 30 s: on a busy machine one may take long to begin.
   void send(int signal_number) const;
   bool ended();  // without waiting
   CommandResult wait();

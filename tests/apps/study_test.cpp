@@ -152,6 +152,7 @@ TEST(StudyConfig, ErrorsNameFileAndField) {
       {R"({"tasks": [{"task": "single"}, {"task": "heap", "objects": 2}]})", "tasks[1].task"},
       {R"({"tasks": [{"task": "stack", "objects": 1}]})", "tasks[0].objects"},
       {R"({"tasks": [{"task": "single", "colour": "red"}]})", "tasks[0].colour"},
+      {R"({"tasks": [{"task": "single", "on_top": 1}]})", "tasks[0].on_top"},
   };
   for (const auto& [json, field] : cases) {
     EXPECT_THAT(error_of(json), AllOf(HasSubstr("study.json"), HasSubstr("'" + field + "'"))) << json;
@@ -416,6 +417,30 @@ TEST(Study, SeriesShareScenesAndReferences) {
   }
   const std::string page = cases_html(job, {rows[1]});
   EXPECT_THAT(page, AllOf(HasSubstr("Trial 1: unknown objects"), HasSubstr("The true scene, placed so")));
+}
+
+// What is wished on top of a cube is put there, in truth as in what was recovered.
+TEST(Study, WhatIsWishedOnTopIsPutThere) {
+  if (!std::filesystem::exists(test_model())) GTEST_SKIP() << "no model at " << test_model();
+  StudyConfig config = study_config_from_json(
+      R"({"tasks": [{"task": "stack", "objects": 2, "on_top": true}], "noise_scales": [0], "samples": 16})",
+      "study.json");
+  config.series[0].model = test_model();
+  const StudyModels models(config);
+  StudyRunner runner(config, 8, models, load_block_library());
+  StudyScene scene = runner.make_scene(0);
+  ASSERT_TRUE(scene.on);
+  const auto height = [&](std::size_t i) { return scene.truth.T_world_object[i].translation().z(); };
+  EXPECT_GT(height(*scene.on), height(1 - *scene.on));
+  scene.truth = {{make_block("cube")}, {make_pose(Eigen::Matrix3d::Identity(), {0, 0, 0.025})}};
+  scene.query = make_block("cube");
+  scene.on = 0;
+  const StudyTrial trial = runner.run(scene, 0, runner.reference_row(scene));
+  EXPECT_TRUE(trial.row.on_top);
+  EXPECT_TRUE(trial.row.stable_ground_truth);
+  ASSERT_TRUE(trial.best);
+  EXPECT_EQ(trial.best->touches, std::vector<int>{0});
+  EXPECT_EQ(trial.row.stable_true, true);
 }
 
 // More views see better; where the robot is wrong about its camera, its placement is off by as much.
