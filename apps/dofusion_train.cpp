@@ -29,11 +29,8 @@ int main(int argc, char** argv) {
   CLI::Option* preset =
       app.add_option("--preset", settings.preset, "default, or paper: the published method to the letter")
           ->capture_default_str();
-  CLI::Option* config =
-      app.add_option("--config", settings.config_path, "JSON file of settings that replace the preset's");
-  app.add_option("--from", settings.from, "a model to begin with: its configuration and its weights")
-      ->excludes(preset)
-      ->excludes(config);
+  app.add_option("--config", settings.config_path, "JSON file of settings that replace the preset's, or the model's");
+  app.add_option("--from", settings.from, "a model to begin with: its configuration and its weights")->excludes(preset);
   app.add_option("--data", settings.data, "datasets of dofusion-generate; their scenes for training are used")
       ->required();
   app.add_option("--holdout-shape", settings.held_out_shape, "leave out every scene with this shape");

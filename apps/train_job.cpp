@@ -43,14 +43,20 @@ void check_files(const TrainOptions& options) {
 
 // The configuration, and into `parameters` the weights to begin with, if a model is given.
 ModelConfig read_config(const TrainSettings& settings, std::vector<float>& parameters) {
-  if (!settings.from.empty()) {
+  ModelConfig config;
+  if (settings.from.empty()) {
+    config = make_config(preset_from_string(settings.preset));
+  } else {
     ModelFile model = read_model(settings.from);
+    config = model.config;
     parameters = std::move(model.parameters);
-    return model.config;
   }
-  const ModelConfig config = make_config(preset_from_string(settings.preset));
   if (settings.config_path.empty()) return config;
-  return config_from_json(read_file(settings.config_path), settings.config_path, config);
+  config = config_from_json(read_file(settings.config_path), settings.config_path, config);
+  if (!parameters.empty() && parameters.size() != static_cast<std::size_t>(make_network(config)->parameter_count()))
+    throw InputError(settings.config_path + ": changes the size of the network, so it cannot begin with the weights of " +
+                     settings.from);
+  return config;
 }
 
 std::vector<SceneDataset> read_scenes(const TrainSettings& settings, Split split) {

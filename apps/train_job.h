@@ -12,7 +12,7 @@ namespace dofusion {
 
 struct TrainSettings {
   std::string preset = "default", config_path, held_out_shape;
-  std::string from;  // a model file: its configuration and its weights to begin with, in place of the two above
+  std::string from;  // a model file to begin with: its configuration in place of the preset's, and its weights
   std::vector<std::string> data;
   std::vector<std::string> tasks;  // scenes of these alone; empty: all
   int validation = 100;  // scenes of the data's validation split that are sampled and settled; 0: none

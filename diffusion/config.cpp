@@ -30,6 +30,7 @@ void for_each_field(Config& c, Visit visit) {
   visit("sharp_share", c.sharp_share);
   visit("point_head", c.point_head);
   visit("equivalent", c.equivalent);
+  visit("perception_noise", c.perception_noise);
   visit("use_sdf", c.use_sdf);
   visit("use_pose", c.use_pose);
 }
@@ -125,6 +126,7 @@ void check(const ModelConfig& c, const std::string& source) {
           "point_head must be a multiple of 32, at most 1024");
   require(!paper || (!c.directions && c.query_share == 0 && c.sharp_share == 0 && c.point_head == 0 && !c.equivalent),
           "directions, query_share, sharp_share, point_head and equivalent belong to the default preset");
+  require(c.perception_noise >= 0 && c.perception_noise <= 1, "perception_noise must be between 0 and 1");
   require(c.noise_frequencies >= 0 && c.noise_frequencies <= 32, "noise_frequencies must be between 0 and 32");
   require(c.sigma_min > 0 && c.sigma_max > c.sigma_min && c.sigma_max < 100,
           "0 < sigma_min < sigma_max < 100 must hold");

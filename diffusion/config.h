@@ -32,6 +32,7 @@ struct ModelConfig {
   double sharp_share = 0.0;   // of each object's points, on its edges and corners
   int point_head = 0;         // hidden channels of the forces on the query's points (point_head.h); 0: none
   bool equivalent = false;    // the target in training is the nearest of a symmetric shape's equal poses
+  double perception_noise = 0.0;  // in training, of what stands around the query: training_data.h
   bool use_sdf = true;                               // ablations of table V
   bool use_pose = true;
 

@@ -114,6 +114,18 @@ Pose TrainingSet::nearest_equivalent(const Shape& shape, const Eigen::Vector3d& 
   return nearest;
 }
 
+// The object as it might be perceived.
+void TrainingSet::perceive(const SceneObject& object, double length, Rng& rng, CloudShapePtr& shape,
+                           Pose& pose) const {
+  const double s = config_.perception_noise;
+  const auto normal3 = [&] { return Eigen::Vector3d{normal(rng), normal(rng), normal(rng)}; };  // braces: in this order
+  const Eigen::Vector3d stretch = (s * normal3()).array().exp();
+  shape = cloud_shape(shapes_[static_cast<std::size_t>(object.shape)], object.scale.cwiseProduct(stretch));
+  const Eigen::Vector3d centre = pose.translation();
+  pose.linear() = so3_exp(s * normal3()) * pose.linear();
+  pose.translation() = centre + s * length * normal3();
+}
+
 void TrainingSet::append(std::uint64_t seed, std::uint64_t example, NetworkInput& batch,
                          std::vector<float>& target_values) const {
   Rng rng = make_rng(seed, example);
@@ -148,6 +160,10 @@ void TrainingSet::append(std::uint64_t seed, std::uint64_t example, NetworkInput
     const Pose target =
         config_.equivalent ? nearest_equivalent(shapes_[object.shape], object.scale, clean, poses[query]) : clean;
     wanted = world_residual(poses[query], target, sigma, length);
+  }
+  for (int i = 0; config_.perception_noise > 0.0 && i <= last; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    if (i != query) perceive(objects[k], length, rng, shapes[k], poses[k]);
   }
   append_input(config_, shapes, poses, query, length, sigma, Eigen::Vector2d::Zero(), config_.points, rng, batch);
   for (int i = 0; i < 6; ++i) target_values.push_back(static_cast<float>(wanted[i]));

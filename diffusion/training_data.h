@@ -1,6 +1,11 @@
 // Training examples drawn from datasets of stable scenes. First the number of objects is drawn, each that there is with
 // a probability proportional to itself: crowded scenes are the hard ones, and often the fewest. Then a scene of so many;
-// a random object, of a stack its top, becomes the query, the scene is turned by a random yaw (and mirrored where the shapes allow it), the query's pose gets noise.
+// a random object, of a stack its top, becomes the query, the scene is turned by a random yaw (and mirrored where the
+// shapes allow it), the query's pose gets noise.
+//
+// With ModelConfig::perception_noise s > 0 the other objects are shown as a camera might have them: each is shifted by
+// N(0, s) normalised lengths along each axis, turned by a rotation vector of N(0, s) radians, and stretched along each
+// of its own axes by exp(N(0, s)). The query's true pose, in the true scene, stays the target.
 #pragma once
 
 #include <cstdint>
@@ -38,6 +43,7 @@ class TrainingSet {
     bool stack = false;                // the last object is the only query
   };
   CloudShapePtr cloud_shape(const Shape& shape, const Eigen::Vector3d& scale) const;
+  void perceive(const SceneObject& object, double length, Rng& rng, CloudShapePtr& shape, Pose& pose) const;
   Pose nearest_equivalent(const Shape& shape, const Eigen::Vector3d& scale, const Pose& clean, const Pose& noisy) const;
 
   ModelConfig config_;

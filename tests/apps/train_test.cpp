@@ -73,9 +73,18 @@ TEST_F(TrainTest, GoesOnFromAModel) {
     ASSERT_NEAR(after.parameters[i], before.parameters[i], 1e-6) << i;
   EXPECT_EQ(json::parse(after.training).at("from"), "m.safetensors");
 
-  std::vector<std::string> both = arguments;
-  both.insert(both.end(), {"--preset", "paper"});
-  expect_refusal(run_command("dofusion-train", both), {"--from", "--preset"});
+  const auto train_with = [&](const std::string& option, const std::string& value) {
+    std::filesystem::remove(out);
+    std::vector<std::string> more = arguments;
+    more.insert(more.end(), {option, value});
+    return run_command("dofusion-train", more);
+  };
+  expect_refusal(train_with("--preset", "paper"), {"--from", "--preset"});
+  write_file(directory_ / "wide.json", R"({"hidden": 64})");
+  expect_refusal(train_with("--config", directory_ / "wide.json"), {"wide.json", "m.safetensors"});
+  write_file(directory_ / "noisy.json", R"({"perception_noise": 0.02})");
+  expect_success(train_with("--config", directory_ / "noisy.json"));
+  EXPECT_EQ(read_model(out).config.perception_noise, 0.02);
   write_file(directory_ / "m.safetensors", "weights");
   std::filesystem::remove(out);
   expect_refusal(run_command("dofusion-train", arguments), {"m.safetensors"});

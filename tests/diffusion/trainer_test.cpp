@@ -211,6 +211,42 @@ TEST_F(TrainerTest, DivergenceStopsAndKeepsTheLastGoodState) {
   EXPECT_NO_THROW(read_model(options_.out));
 }
 
+// What stands around the query is shown where it is not, by as much as is asked for; the target stays.
+TEST_F(TrainerTest, PerceptionNoiseMovesTheOthersAlone) {
+  SceneDataset dataset;
+  dataset.shapes = {make_block("cube")};
+  SceneRecord record;
+  record.objects.resize(2);
+  record.objects[0].T_world_object = make_pose(Eigen::Matrix3d::Identity(), {0, 0, 0.025});
+  record.objects[1].T_world_object = make_pose(Eigen::Matrix3d::Identity(), {0, 0, 0.075});
+  record.task = Task::kStack;  // the upper one is the query
+  dataset.scenes = {record};
+  const auto lowest_of_context = [&](double noise, std::uint64_t example) {
+    ModelConfig config = small_config();
+    config.sigma_min = 0.0099;
+    config.sigma_max = 0.01;
+    config.perception_noise = noise;
+    const TrainingSet data({dataset}, config);
+    NetworkInput input;
+    std::vector<float> target;
+    data.append(1, example, input, target);
+    float lowest = 1e9f;
+    for (int i = 0; i < input.points; ++i) {
+      const float* point = &input.cloud[static_cast<std::size_t>(i * kCloudChannels)];
+      if (point[4] == 0.0f) lowest = std::min(lowest, point[2]);
+    }
+    for (const float t : target) EXPECT_LT(std::abs(t), 6.0f);  // the added noise alone
+    return lowest;
+  };
+  double sum = 0.0;
+  for (std::uint64_t i = 0; i < 100; ++i) {
+    EXPECT_NEAR(lowest_of_context(0.0, i), 0.0f, 1e-4f);
+    sum += std::abs(lowest_of_context(0.1, i));
+  }
+  EXPECT_GT(sum / 100, 0.05);
+  EXPECT_LT(sum / 100, 0.25);
+}
+
 // Of a cube's 24 equal poses one is never farther than 62.8 degrees; a cylinder's nearest one differs in its axis
 // alone, at most 90 degrees. Without the option targets go all the way.
 TEST_F(TrainerTest, TargetsAreTheNearestOfEqualPoses) {
