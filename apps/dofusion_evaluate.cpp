@@ -63,7 +63,7 @@ int main(int argc, char** argv) {
 #endif
     if (settings.models.empty()) settings.models = {default_model_path()};
     const nlohmann::json result = evaluate(settings);
-    std::printf("%s", format_evaluation(result).c_str());
+    summary(format_evaluation(result));
     if (!json_path.empty()) write_file(json_path, result.dump(2) + "\n");
   });
 }

@@ -83,7 +83,8 @@ int main(int argc, char** argv) {
     if (!arguments.json.empty()) check_writable(arguments.json);
     const GenerateResult result = generate_dataset(ranks, plan_of(arguments), arguments.out, arguments.threads);
     if (!arguments.json.empty()) write_file(arguments.json, result.summary.dump(2) + "\n");
-    std::printf("%s\n", result.line.c_str());
+    summary(result.line + "\nnext: dofusion-train --data " + arguments.out + " … or dofusion-scan --data " +
+            arguments.out + " …\n");
   };
   return run_program(app, argc, argv, body, rank_from_environment() == 0);
 }

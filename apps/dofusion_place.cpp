@@ -27,7 +27,8 @@ using ViewWords = std::vector<std::tuple<std::string, std::string, std::string>>
 void add_image_options(CLI::App& app, PlaceArguments& arguments, ViewWords& views) {
   const std::string group = "The scene";
   auto* depth = app.add_option("--depth", arguments.depth, "16-bit depth image (PNG)")->group(group);
-  auto* cloud = app.add_option("--cloud", arguments.cloud, "a cloud (.pcd, .ply) in the camera's frame instead")->group(group);
+  auto* cloud =
+      app.add_option("--cloud", arguments.cloud, "a cloud (.pcd, .ply) in the camera's frame instead")->group(group);
   auto* camera = app.add_option("--camera", arguments.camera,
                                 "camera.json: fx, fy, cx, cy, width, height, depth_scale; for --depth and --cloud")
                      ->group(group);
@@ -35,7 +36,8 @@ void add_image_options(CLI::App& app, PlaceArguments& arguments, ViewWords& view
                               "several images instead, each with depth.png camera.json pose.json; the pose is 4 x 4 "
                               "numbers, T_world_camera in a frame that all share")
                    ->group(group);
-  auto* bop = app.add_option("--bop", arguments.bop, "a BOP dataset instead, such as dofusion-scan writes")->group(group);
+  auto* bop =
+      app.add_option("--bop", arguments.bop, "a BOP dataset instead, such as dofusion-scan writes")->group(group);
   app.add_option("--scene", arguments.scene, "its scene")->check(CLI::NonNegativeNumber)->needs(bop)->group(group);
   app.add_option("--image", arguments.images, "its image; several are joined as --view does")
       ->check(CLI::NonNegativeNumber)
@@ -53,23 +55,25 @@ void add_image_options(CLI::App& app, PlaceArguments& arguments, ViewWords& view
 
 void add_object_options(CLI::App& app, PlaceArguments& arguments, bool& unknown) {
   const std::string group = "The objects";
-  app.add_option("--query", arguments.query, "a block (cube, rectangle, half_rectangle, tall_triangle, middle_triangle, "
-                                             "tetrahedron, hat) or a mesh file in metres")
+  app.add_option("--query", arguments.query,
+                 "a block (cube, rectangle, half_rectangle, tall_triangle, middle_triangle, "
+                 "tetrahedron, hat) or a mesh file in metres")
       ->required()
       ->group(group);
   app.add_option("--query-unit", arguments.query_unit, "metres in a unit of the query's mesh: 0.001 for millimetres")
       ->check(CLI::PositiveNumber)
       ->group(group);
-  auto* objects = app.add_option("--objects", arguments.objects,
-                                 "folder of meshes: the objects on the table are among these")
-                      ->group(group);
+  auto* objects =
+      app.add_option("--objects", arguments.objects, "folder of meshes: the objects on the table are among these")
+          ->group(group);
   app.add_option("--objects-unit", arguments.objects_unit, "metres in a unit of those meshes")
       ->check(CLI::PositiveNumber)
       ->group(group);
-  auto* models = app.add_flag("--bop-models", arguments.bop_models, "the objects are among the models of the BOP dataset")
-                     ->needs("--bop")
-                     ->excludes(objects)
-                     ->group(group);
+  auto* models =
+      app.add_flag("--bop-models", arguments.bop_models, "the objects are among the models of the BOP dataset")
+          ->needs("--bop")
+          ->excludes(objects)
+          ->group(group);
   app.add_flag("--unknown", unknown, "nothing is known of the objects on the table (the default)")
       ->excludes(objects, models)
       ->group(group);
@@ -108,18 +112,21 @@ struct WishWords {
 
 void add_wish_options(CLI::App& app, WishWords& wishes) {
   const std::string group = "Wishes (exit status 3 if no stable placement meets them)";
-  app.add_option("--region", wishes.region, "x0 y0 x1 y1: the query's centre within this part of the table, metres, world")
+  app.add_option("--region", wishes.region,
+                 "x0 y0 x1 y1: the query's centre within this part of the table, metres, world")
       ->expected(4)
       ->group(group);
   app.add_option("--image-region", wishes.image_region, "u0 v0 u1 v1: within this part of the (first) image, pixels")
       ->expected(4)
       ->group(group);
-  app.add_option("--on", wishes.on, "table: it touches the table; a number: it rests on that object and not on the table")
+  app.add_option("--on", wishes.on,
+                 "table: it touches the table; a number: it rests on that object and not on the table")
       ->group(group);
   app.add_option("--clearance", wishes.clearance, "metres to every object that it does not touch")
       ->check(CLI::PositiveNumber)
       ->group(group);
-  app.add_option("--upright", wishes.upright, "x, y, z, -x, -y or -z of the query's mesh points up, to 10 degrees; z by itself")
+  app.add_option("--upright", wishes.upright,
+                 "x, y, z, -x, -y or -z of the query's mesh points up, to 10 degrees; z by itself")
       ->expected(0, 1)
       ->group(group);
 }
@@ -181,7 +188,8 @@ int main(int argc, char** argv) {
     write_outputs(output.path().string(), inputs, arguments, result);
     if (!json.empty()) write_file(json, placements_json(inputs, arguments, result));
     output.commit();
-    std::printf("%s\nreport: %s/report.html\n", summary_line(inputs, result).c_str(), out.c_str());
+    summary(summary_line(inputs, result) + "\nreport: " + out + "/report.html; all candidates: " + out +
+            "/placements.json; the scene for MuJoCo: " + out + "/scene.xml\n");
     found = !arguments.wishes.any() || found_placement(result);
   });
   return status == 0 && !found ? kUnreachable : status;

@@ -109,8 +109,10 @@ int main(int argc, char** argv) {
     if (!json.empty()) check_writable(json);
     const ScanResult result = scan_scenes(job);
     if (!json.empty()) write_file(json, to_json(job, result).dump(2) + "\n");
-    std::printf("%s: %ld images of %ld scenes, %ld models, %.1f images/s\n", job.out.c_str(),
-                static_cast<long>(result.images), static_cast<long>(result.scenes), static_cast<long>(result.models),
-                result.images_per_second);
+    char rate[32];
+    std::snprintf(rate, sizeof rate, "%.1f", result.images_per_second);
+    summary(job.out + ": " + std::to_string(result.images) + " images of " + std::to_string(result.scenes) +
+            " scenes, " + std::to_string(result.models) + " models, " + rate +
+            " images/s\nnext: dofusion-place --bop " + job.out + " --scene 0 --image 0 …\n");
   });
 }

@@ -43,6 +43,6 @@ int main(int argc, char** argv) {
       // Names in MJCF files need not be UTF-8.
       write_file(json, to_json(report).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
     }
-    std::fputs(to_text(report).c_str(), stdout);
+    summary(to_text(report));
   });
 }

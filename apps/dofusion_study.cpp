@@ -74,15 +74,15 @@ int main(int argc, char** argv) {
     if (!json.empty()) check_writable(json);
 
     const std::vector<StudyRow> rows = run_study(ranks, job);
-    const StudySummary summary = summarise(rows, job.config, job.seed);
+    const StudySummary figures = summarise(rows, job.config, job.seed);
     OutputDirectory output(out);
-    write_study(output.path().string(), rows, summary, job.config, settings, job.seed);
+    write_study(output.path().string(), rows, figures, job.config, settings, job.seed);
     write_file((output.path() / "worst.html").string(), cases_html(job, worst_cases(rows)));
     output.commit();
-    if (!json.empty()) write_file(json, to_json(summary, settings).dump(2) + "\n");
+    if (!json.empty()) write_file(json, to_json(figures, settings).dump(2) + "\n");
     std::error_code ignored;
     std::filesystem::remove(job.partial, ignored);
-    std::printf("%sreport: %s/report.html\n", study_text(summary).c_str(), out.c_str());
+    summary(study_text(figures) + "report: " + out + "/report.html; the worst trials: " + out + "/worst.html\n");
   };
   return run_program(app, argc, argv, body, rank_from_environment() == 0);
 }

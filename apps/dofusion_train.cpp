@@ -76,8 +76,9 @@ int main(int argc, char** argv) {
     const nlohmann::json result = train_model(settings);
     if (settings.rank > 0) return;
     if (!json_path.empty()) write_file(json_path, result.dump(2) + "\n");
-    std::printf("%s: %lld steps, %.2f M samples in %.1f minutes\n", options.out.c_str(),
-                result["steps"].get<long long>(), 1e-6 * result["samples"].get<double>(),
-                result["seconds"].get<double>() / 60.0);
+    char line[96];
+    std::snprintf(line, sizeof line, ": %lld steps, %.2f M samples in %.1f minutes\n", result["steps"].get<long long>(),
+                  1e-6 * result["samples"].get<double>(), result["seconds"].get<double>() / 60.0);
+    summary(options.out + line + "next: dofusion-evaluate --model " + options.out + "\n");
   });
 }

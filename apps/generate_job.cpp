@@ -196,8 +196,7 @@ GenerateResult generate_dataset(Ranks& ranks, const GenerationPlan& plan, const 
   std::int64_t done = count - static_cast<std::int64_t>(missing.size());
   const std::int64_t resumed = done;
   if (resumed > 0) {
-    std::fprintf(stderr, "continuing with the %ld scenes of %s\n", static_cast<long>(resumed),
-                 journal_path(out).c_str());
+    note("continuing with the " + std::to_string(resumed) + " scenes of " + journal_path(out));
   }
   try {
     Progress progress("scenes", count, done);

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "apps/program.h"
 #include "perception/bop_frame.h"
 #include "perception/cloud_io.h"
 #include "perception/depth_io.h"
@@ -24,7 +25,7 @@ ObjectAndOffset load_solid(const std::string& file, double unit, const std::stri
   ObjectAndOffset solid;
   try {
     const MendedMesh mended = read_mended_mesh(file, unit, kMostSolidTriangles);
-    if (mended.holes > 0) std::fprintf(stderr, "%s\n", mending_note(file, mended).c_str());
+    if (mended.holes > 0) note(mending_note(file, mended));
     solid = make_object(fs::path(file).stem().string(), mended.mesh);
     solid.object = with_convex_parts(solid.object);
   } catch (const std::invalid_argument& e) {

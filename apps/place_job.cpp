@@ -109,7 +109,9 @@ PlaceResult run_placement(const PlaceInputs& inputs, const PlaceArguments& argum
   recovery.mask = inputs.mask;
   recovery.physics = arguments.placement.physics;
   recovery.threads = arguments.placement.threads;
-  const PlacementModel model = PlacementModel::load(arguments.model.empty() ? default_model_path() : arguments.model);
+  const std::string model_file = arguments.model.empty() ? default_model_path() : arguments.model;
+  const PlacementModel model = PlacementModel::load(model_file);
+  detail("model: " + model_file);
   std::vector<View> views = {{inputs.depth, inputs.camera, inputs.T_given_camera.value_or(Pose::Identity()), {}}};
   views.insert(views.end(), inputs.more_views.begin(), inputs.more_views.end());
   result.recovered = recover_scene(views, recovery);
@@ -118,6 +120,11 @@ PlaceResult run_placement(const PlaceInputs& inputs, const PlaceArguments& argum
     return found == result.recovered.timing_ms.end() ? 0.0 : found->second;
   };
   result.timing_ms = {{"segment", recovered_ms("segment")}, {"recover", recovered_ms("recover")}};
+  for (std::size_t i = 0; i < result.recovered.objects.size(); ++i) {
+    const RecoveredObject& object = result.recovered.objects[i];
+    detail("object " + std::to_string(i) + ": " + object.name + ", " + std::to_string(object.pixels) + " pixels, " +
+           std::to_string(std::lround(100.0 * object.score)) + " % explained");
+  }
   if (!result.recovered.table) {
     for (const char* step : {"sdf", "sample", "settle"}) result.timing_ms.emplace_back(step, 0.0);
     return result;
@@ -150,6 +157,7 @@ PlaceResult run_placement(const PlaceInputs& inputs, const PlaceArguments& argum
       result.placements.push_back(std::move(placement));
     }
     settle_ms += watch.lap_ms();
+    detail(std::to_string(candidates.size()) + " candidates sampled and settled");
   }
   result.timing_ms.emplace_back("sample", sample_ms);
   if (interrupted()) throw Interrupted("interrupted");

@@ -15,6 +15,9 @@
 namespace dofusion {
 namespace {
 
+enum class Verbosity { kQuiet, kNormal, kVerbose };
+Verbosity verbosity = Verbosity::kNormal;  // set once, before the work begins
+
 volatile std::sig_atomic_t stop_requested = 0;
 // The second one ends the program at once.
 extern "C" void request_stop(int signal_number) {
@@ -45,11 +48,26 @@ std::string duration(double seconds) {
 
 bool interrupted() { return stop_requested != 0; }
 
+void summary(const std::string& text) {
+  if (verbosity != Verbosity::kQuiet) std::fputs(text.c_str(), stdout);
+}
+
+void note(const std::string& line) {
+  if (verbosity != Verbosity::kQuiet) std::fprintf(stderr, "%s\n", line.c_str());
+}
+
+void detail(const std::string& line) {
+  if (verbosity == Verbosity::kVerbose) note(line);
+}
+
 int run_program(CLI::App& app, int argc, char** argv, const std::function<void()>& body, bool speaks) {
   std::signal(SIGINT, request_stop);
   std::signal(SIGTERM, request_stop);
   std::signal(SIGXFSZ, SIG_IGN);  // a file over the user's limit is a write that fails, with its line
   app.set_version_flag("--version", "dofusion 0.1.0");
+  bool quiet = false, verbose = false;
+  CLI::Option* quiet_flag = app.add_flag("-q,--quiet", quiet, "say nothing but errors");
+  app.add_flag("-v,--verbose", verbose, "say what is done, step by step")->excludes(quiet_flag);
   app.get_formatter()->column_width(34);
   const std::string name = app.get_name();
   const auto say = [&](const std::string& line) {
@@ -62,6 +80,7 @@ int run_program(CLI::App& app, int argc, char** argv, const std::function<void()
     say(first_line(e.what()) + "; see " + name + " --help");
     return 2;
   }
+  verbosity = quiet ? Verbosity::kQuiet : verbose ? Verbosity::kVerbose : Verbosity::kNormal;
   try {
     body();
     return 0;
@@ -86,10 +105,11 @@ Progress::Progress(std::string what, std::int64_t total, std::int64_t done)
       last_(begin_) {}
 
 Progress::~Progress() {
-  if (terminal_) std::fprintf(stderr, "\n");
+  if (terminal_ && verbosity != Verbosity::kQuiet) std::fprintf(stderr, "\n");
 }
 
 void Progress::update(std::int64_t done, const std::string& note) {
+  if (verbosity == Verbosity::kQuiet) return;
   static std::mutex mutex;
   const std::lock_guard<std::mutex> lock(mutex);
   const Clock::time_point now = Clock::now();

@@ -10,10 +10,16 @@
 
 namespace dofusion {
 
-// Adds --version and formats help; then parses, runs `body` and returns the exit status: 0 done, 2 bad arguments or
+// Adds --version, --quiet and --verbose, and formats help; then parses, runs `body` and returns the exit status: 0 done, 2 bad arguments or
 // bad input (InputError, std::invalid_argument), 1 anything else. Errors are one line on stderr, unless `speaks` is
 // false, as it is for all but the first of the processes that share one job.
 int run_program(CLI::App& app, int argc, char** argv, const std::function<void()>& body, bool speaks = true);
+
+// What a program says besides errors; --quiet silences all of it, progress included. summary: the result, on stdout, as
+// it is. note: a line on stderr. detail: a line on stderr with --verbose alone.
+void summary(const std::string& text);
+void note(const std::string& line);
+void detail(const std::string& line);
 
 // True once Ctrl-C (or a termination signal) has come; long loops look at it and leave complete files behind.
 // run_program installs the handler.

@@ -229,8 +229,7 @@ ScanResult scan_all(const ScanJob& job, const ScanScenes& scenes, const ScanFold
   result.models = static_cast<std::int64_t>(scenes.models.size());
   result.resumed = scans.images() - scans.left();
   if (folder.resumed()) {
-    std::fprintf(stderr, "continuing with the %ld images of %s\n", static_cast<long>(result.resumed),
-                 folder.path().c_str());
+    note("continuing with the " + std::to_string(result.resumed) + " images of " + folder.path().string());
   }
   const auto begin = std::chrono::steady_clock::now();
   const double processor_begin = processor_seconds();

@@ -87,7 +87,7 @@ std::vector<StudyRow> run_study(Ranks& ranks, const StudyJob& job) {
   PartialRows rows(job.partial, study_settings(job));
   const std::int64_t before = rows.count(job.trials);
   if (before > 0) {
-    std::fprintf(stderr, "continuing with the %ld trials of %s\n", static_cast<long>(before), job.partial.c_str());
+    note("continuing with the " + std::to_string(before) + " trials of " + job.partial);
   }
   try {
     Progress progress("trials", job.trials, before);

@@ -25,13 +25,15 @@ using Json = nlohmann::json;
 
 void print(const TrainReport& r) {
   const auto minutes = static_cast<int>(r.seconds_left / 60.0);
-  std::fprintf(stderr,
-               "step %lld  %.2f M samples  loss %.4f (low %.4f, middle %.4f, high %.4f)  %.0f samples/s  %d:%02d left",
-               static_cast<long long>(r.step), static_cast<double>(r.samples) * 1e-6, r.loss, r.loss_by_noise[0],
-               r.loss_by_noise[1], r.loss_by_noise[2], r.samples_per_second, minutes,
-               static_cast<int>(r.seconds_left - 60.0 * minutes));
-  if (std::isfinite(r.validation)) std::fprintf(stderr, "  %.0f %% stable", 100.0 * r.validation);
-  std::fputc('\n', stderr);
+  char line[256];
+  std::snprintf(line, sizeof line,
+                "step %lld  %.2f M samples  loss %.4f (low %.4f, middle %.4f, high %.4f)  %.0f samples/s  %d:%02d left",
+                static_cast<long long>(r.step), static_cast<double>(r.samples) * 1e-6, r.loss, r.loss_by_noise[0],
+                r.loss_by_noise[1], r.loss_by_noise[2], r.samples_per_second, minutes,
+                static_cast<int>(r.seconds_left - 60.0 * minutes));
+  char stable[32] = "";
+  if (std::isfinite(r.validation)) std::snprintf(stable, sizeof stable, "  %.0f %% stable", 100.0 * r.validation);
+  note(std::string(line) + stable);
 }
 
 void check_files(const TrainOptions& options) {
@@ -54,8 +56,8 @@ ModelConfig read_config(const TrainSettings& settings, std::vector<float>& param
   if (settings.config_path.empty()) return config;
   config = config_from_json(read_file(settings.config_path), settings.config_path, config);
   if (!parameters.empty() && parameters.size() != static_cast<std::size_t>(make_network(config)->parameter_count()))
-    throw InputError(settings.config_path + ": changes the size of the network, so it cannot begin with the weights of " +
-                     settings.from);
+    throw InputError(settings.config_path +
+                     ": changes the size of the network, so it cannot begin with the weights of " + settings.from);
   return config;
 }
 
@@ -65,7 +67,10 @@ std::vector<SceneDataset> read_scenes(const TrainSettings& settings, Split split
   filter.without_shape = settings.held_out_shape;
   for (const std::string& task : settings.tasks) filter.tasks.push_back(task_from_string(task));
   std::vector<SceneDataset> datasets;
-  for (const std::string& path : settings.data) datasets.push_back(read_dataset(path, filter));
+  for (const std::string& path : settings.data) {
+    datasets.push_back(read_dataset(path, filter));
+    detail(path + ": " + std::to_string(datasets.back().scenes.size()) + " scenes for " + to_string(split));
+  }
   return datasets;
 }
 
@@ -95,7 +100,7 @@ std::function<double(const ModelConfig&, const std::vector<float>&)> make_valida
   std::vector<Instance> instances =
       instances_of(read_scenes(settings, Split::kValidation), settings.validation, settings.options.seed);
   if (instances.empty()) {
-    std::fprintf(stderr, "no validation: the data has no scenes for it\n");
+    note("no validation: the data has no scenes for it");
     return {};
   }
   return [instances = std::move(instances), threads = settings.options.threads](const ModelConfig& config,
@@ -147,8 +152,9 @@ Json train_model(const TrainSettings& settings) {
 #endif
   const std::unique_ptr<Peers> peers = meet(settings);
   if (first)
-    std::fprintf(stderr, "%zu scenes, preset %s, %d threads%s\n", set.scenes(), to_string(config.preset).c_str(),
-                 settings.options.threads, peers ? (", " + std::to_string(peers->count()) + " processes").c_str() : "");
+    note(std::to_string(set.scenes()) + " scenes, preset " + to_string(config.preset) + ", " +
+         std::to_string(settings.options.threads) + " threads" +
+         (peers ? ", " + std::to_string(peers->count()) + " processes" : ""));
   const TrainResult result = train(set, config, options, record.dump(), callbacks, peers.get());
   if (!result.finished) throw Interrupted("interrupted; go on with --resume");
   return {{"finished", result.finished},

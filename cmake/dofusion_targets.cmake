@@ -31,6 +31,8 @@ function(dofusion_add_program name)
   target_link_libraries(${name} PRIVATE ${ARG_LINK})
   dofusion_set_warnings(${name})
   install(TARGETS ${name} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+  install(FILES ${PROJECT_SOURCE_DIR}/apps/completion.bash RENAME ${name}
+          DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
 endfunction()
 
 # A GoogleTest program; its tests are registered with CTest.

@@ -156,6 +156,27 @@ void check_scene(const std::string& out, const json& result) {
   }
 }
 
+TEST_F(PlaceTest, SaysAsMuchAsIsAskedFor) {
+  write_scan(scan_of(two_blocks(), small_camera()));
+  const std::vector<std::string> arguments = {"--unknown", "--query", "cube", "--samples", "1", "--steps", "3"};
+  const auto place_with = [&](const std::string& option) {
+    std::filesystem::remove_all(out());
+    std::vector<std::string> words = arguments;
+    words.push_back(option);
+    return place(words);
+  };
+  const CommandResult quiet = place_with("--quiet"), verbose = place_with("-v");
+  expect_success(quiet);
+  EXPECT_EQ(quiet.out + quiet.err, "");
+  expect_success(verbose);
+  EXPECT_THAT(verbose.out, HasSubstr("report: "));
+  EXPECT_THAT(verbose.err, testing::AllOf(HasSubstr("model: "), HasSubstr("object 0: "), HasSubstr("1 candidates")));
+  std::filesystem::remove_all(out());
+  std::vector<std::string> both = arguments;
+  both.insert(both.end(), {"-q", "-v"});
+  expect_refused(both, {"--quiet"});
+}
+
 TEST_F(PlaceTest, KnownBlocksAreFoundAndTheOutputsAreWhole) {
   const TestScan scan = scan_of(two_blocks(), small_camera());
   write_scan(scan);
