@@ -8,11 +8,20 @@ std::string html_escaped(const std::string& text) {
   std::string out;
   for (const char c : text) {
     switch (c) {
-      case '&': out += "&amp;"; break;
-      case '<': out += "&lt;"; break;
-      case '>': out += "&gt;"; break;
-      case '"': out += "&quot;"; break;
-      default: out += c;
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      default:
+        out += c;
     }
   }
   return out;
@@ -35,8 +44,9 @@ std::string base64(const std::string& bytes) {
   return out;
 }
 
-std::string png_image(const std::string& png, const std::string& alt) {
-  return "<img alt=\"" + html_escaped(alt) + "\" src=\"data:image/png;base64," + base64(png) + "\">";
+std::string embedded_image(const std::string& bytes, const std::string& alt) {
+  const std::string type = bytes.rfind("\xff\xd8", 0) == 0 ? "jpeg" : "png";
+  return "<img alt=\"" + html_escaped(alt) + "\" src=\"data:image/" + type + ";base64," + base64(bytes) + "\">";
 }
 
 std::string html_begin(const std::string& title) {
@@ -47,7 +57,8 @@ std::string html_begin(const std::string& title) {
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <meta http-equiv="Content-Security-Policy"
       content="default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'">
-<title>)" + html_escaped(title) + R"(</title>
+<title>)" +
+         html_escaped(title) + R"(</title>
 <style>
   :root { --ink: #1c2430; --soft: #5c6675; --line: #dfe3e8; --good: #1a7f4b; --bad: #b3402a; }
   body { font: 15px/1.5 system-ui, "Segoe UI", Roboto, Helvetica, Arial, sans-serif; color: var(--ink); margin: 0;

@@ -7,7 +7,8 @@ namespace dofusion {
 
 std::string html_escaped(const std::string& text);
 std::string base64(const std::string& bytes);
-std::string png_image(const std::string& png, const std::string& alt);  // <img> with the picture inside
+// <img> with the picture inside; `bytes` is a PNG or JPEG file.
+std::string embedded_image(const std::string& bytes, const std::string& alt);
 
 // Head with the reports' style sheet, up to the open <main>; the matching end. Its policy lets the page load nothing from
 // outside.

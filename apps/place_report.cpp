@@ -24,7 +24,7 @@ std::string number(double value, int digits = 2) {
 }
 
 std::string figure(const std::string& png, const std::string& caption) {
-  return "<figure>" + png_image(png, caption) + "<figcaption>" + html_escaped(caption) + "</figcaption></figure>\n";
+  return "<figure>" + embedded_image(png, caption) + "<figcaption>" + html_escaped(caption) + "</figcaption></figure>\n";
 }
 
 Scene with_query(const Scene& context, const ObjectPtr& query, const std::vector<Pose>& poses) {

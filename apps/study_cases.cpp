@@ -7,6 +7,8 @@
 #include <memory>
 #include <set>
 
+#include <Eigen/Geometry>
+
 #include "apps/html.h"
 #include "apps/study_figures.h"
 #include "apps/study_runner.h"
@@ -22,7 +24,8 @@ double distance_from_own_noise(const StudyRow& row) {
   return row.noise_scale > 0.0 ? std::abs(std::log(row.noise_scale)) : std::numeric_limits<double>::max();
 }
 
-double moved(const StudyRow& row) { return row.displacement_true_pct.value_or(std::numeric_limits<double>::max()); }
+// What was not carried out, or diverged, shows little.
+double moved(const StudyRow& row) { return row.displacement_true_pct.value_or(-1.0); }
 
 Scene with_query(const Scene& context, const ObjectPtr& query, const std::vector<Pose>& context_poses,
                  const Pose& T_world_query) {
@@ -33,17 +36,37 @@ Scene with_query(const Scene& context, const ObjectPtr& query, const std::vector
 }
 
 struct CasePictures {
-  std::string depth, segmentation, recovered, put, settled;  // PNG
+  std::string depth, segmentation, recovered, put, settled;  // JPEG
 };
+
+// The part of the camera's image that the narrower camera sees, and the camera of that part.
+template <typename Pixel>
+Image<Pixel> cropped(const Image<Pixel>& image, const Eigen::AlignedBox2i& part) {
+  Image<Pixel> result(part.sizes().x(), part.sizes().y());
+  for (int v = 0; v < result.height; ++v)
+    for (int u = 0; u < result.width; ++u) result.at(v, u) = image.at(part.min().y() + v, part.min().x() + u);
+  return result;
+}
+
+Eigen::AlignedBox2i part_seen_by(const Camera& close, const Camera& whole) {
+  const auto pixel = [&](double u, double v) {
+    return Eigen::Vector2d((u - close.cx) / close.fx * whole.fx + whole.cx,
+                           (v - close.cy) / close.fy * whole.fy + whole.cy);
+  };
+  const Eigen::Array2i size(whole.width, whole.height);
+  const Eigen::Array2i low = pixel(0, 0).array().cast<int>().max(0).min(size - 2);
+  const Eigen::Array2i high = pixel(close.width, close.height).array().cast<int>().max(low + 2).min(size);
+  return {low.matrix(), high.matrix()};
+}
 
 CasePictures render(const StudyScene& scene, const StudyTrial& trial) {
   CasePictures pictures;
   const SyntheticView& view = trial.views.front();
   const Camera camera = default_camera();
-  pictures.depth = to_png(depth_picture(view.depth));
-  if (!trial.best) return pictures;
-  pictures.segmentation = to_png(segmentation_picture(trial.recovered.labels, view.depth, camera));
-
+  if (!trial.best) {
+    pictures.depth = to_jpeg(depth_picture(view.depth));
+    return pictures;
+  }
   const Pose& T_recovered_camera = trial.recovered.table->T_world_camera;
   const Scene& found = trial.recovered.scene;
   const Pose T_true_query = trial.T_true_recovered * trial.best->T_world_query;
@@ -52,10 +75,21 @@ CasePictures render(const StudyScene& scene, const StudyTrial& trial) {
   Scene settled = put;
   if (trial.settled_true.size() == put.objects.size()) settled.T_world_object = trial.settled_true;
   const Camera close = zoomed_on(camera, view.T_world_camera, {put, settled}, kPictureWidth);
+
+  const Eigen::AlignedBox2i part = part_seen_by(close, camera);
+  const DepthImage depth = cropped(view.depth, part);
+  Camera of_part = camera;
+  of_part.cx -= part.min().x();
+  of_part.cy -= part.min().y();
+  of_part.width = depth.width;
+  of_part.height = depth.height;
+  pictures.depth = to_jpeg(depth_picture(depth));
+  pictures.segmentation = to_jpeg(segmentation_picture(cropped(trial.recovered.labels, part), depth, of_part));
+
   const auto picture = [&](const Scene& what, const Pose& T_world_camera) {
     PictureOptions options;
     options.highlighted = static_cast<int>(what.objects.size()) - 1;
-    return to_png(shaded_picture(what, close, T_world_camera, options));
+    return to_jpeg(shaded_picture(what, close, T_world_camera, options));
   };
   pictures.recovered = picture(recovered, T_recovered_camera);
   pictures.put = picture(put, view.T_world_camera);
@@ -63,9 +97,10 @@ CasePictures render(const StudyScene& scene, const StudyTrial& trial) {
   return pictures;
 }
 
-std::string figure(const std::string& png, const std::string& caption) {
-  if (png.empty()) return "";
-  return "<figure>" + png_image(png, caption) + "<figcaption>" + html_escaped(caption) + "</figcaption></figure>\n";
+std::string figure(const std::string& picture, const std::string& caption) {
+  if (picture.empty()) return "";
+  return "<figure>" + embedded_image(picture, caption) + "<figcaption>" + html_escaped(caption) +
+         "</figcaption></figure>\n";
 }
 
 std::string rounded(double value) {
@@ -76,8 +111,8 @@ std::string rounded(double value) {
 
 // "trial 7: unknown objects, noise scale 1; cube, hat on the table, the arch to place. 3 objects found of 2; …"
 std::string description(const StudyConfig& config, const StudyRow& row) {
-  std::string context = row.context;
-  std::replace(context.begin(), context.end(), '+', ',');
+  std::string context;
+  for (const char c : row.context) context += c == '+' ? std::string(", ") : std::string(1, c);
   std::string text = "Trial " + std::to_string(row.trial) + ": " +
                      series_title(config, static_cast<std::size_t>(row.series)) + "; noise scale " +
                      plain(row.noise_scale) + "; on the table: " + context + "; to place: " + row.query +

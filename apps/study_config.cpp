@@ -239,6 +239,13 @@ std::string series_title(const StudyConfig& config, std::size_t series) {
   return title;
 }
 
+std::string task_title(const StudyTask& task) {
+  std::string title = "one block";
+  if (task.task == Task::kStack) title = std::to_string(task.objects) + " stacked blocks";
+  if (task.task == Task::kUnstructured) title = std::to_string(task.objects) + " blocks touching or side by side";
+  return title + (task.on_top ? ", one more wished on top" : "");
+}
+
 std::string sensor_title(SensorModel sensor) {
   switch (sensor) {
     case SensorModel::kNone:

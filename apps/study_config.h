@@ -57,6 +57,7 @@ double depth_sigma_mm(const StudyCondition& condition, double noise_scale);
 // What sets a series apart from the first, for people: "unknown objects, at 1 m"; of the first itself, all of it.
 std::string series_title(const StudyConfig& config, std::size_t series);
 
-std::string sensor_title(SensorModel sensor);  // "the RealSense D435"
+std::string task_title(const StudyTask& task);  // "one block", "2 stacked blocks, one more wished on top"
+std::string sensor_title(SensorModel sensor);   // "the RealSense D435"
 
 }  // namespace dofusion

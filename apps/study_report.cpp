@@ -24,15 +24,7 @@ std::string number(double value) {
 
 std::string tasks_text(const StudyConfig& config) {
   std::string list;
-  for (const StudyTask& task : config.tasks) {
-    if (!list.empty()) list += ", ";
-    if (task.task == Task::kSingle)
-      list += "one block";
-    else
-      list += std::to_string(task.objects) +
-              (task.task == Task::kStack ? " stacked blocks" : " blocks touching or side by side");
-    if (task.on_top) list += " with one more wished on top";
-  }
+  for (const StudyTask& task : config.tasks) list += (list.empty() ? "" : "; ") + task_title(task);
   return list;
 }
 
@@ -68,7 +60,7 @@ const std::vector<TableRow>& table_rows() {
 }
 
 std::string summary_table(const std::vector<StudyPoint>& points) {
-  std::string html = "<div class=\"wide\"><table>\n<thead><tr><th>Noise scale</th>";
+  std::string html = "<div class=\"scroll\"><table>\n<thead><tr><th>Noise scale</th>";
   for (const StudyPoint& p : points) html += "<th>" + plain(p.noise_scale) + "</th>";
   html += "</tr>\n<tr><td>Depth σ, mm</td>";
   for (const StudyPoint& p : points) html += "<td>" + number(p.depth_sigma_mm) + "</td>";
@@ -82,6 +74,12 @@ std::string summary_table(const std::vector<StudyPoint>& points) {
     }
     html += "</tr>\n";
   }
+  const auto& tasks = points.front().stable_by_task;
+  for (auto task = tasks.begin(); tasks.size() > 1 && task != tasks.end(); ++task) {
+    html += "<tr><td>Stand in the true scene: " + html_escaped(task->first) + ", %</td>";
+    for (const StudyPoint& p : points) html += cell(p.stable_by_task.at(task->first), 100.0);
+    html += "</tr>\n";
+  }
   for (std::size_t i = 0; i < failure_names().size(); ++i) {
     html += "<tr><td>Failed first: " + failure_titles()[i] + ", %</td>";
     for (const StudyPoint& p : points) html += "<td>" + number(100.0 * p.failures.at(failure_names()[i])) + "</td>";
@@ -91,13 +89,16 @@ std::string summary_table(const std::vector<StudyPoint>& points) {
 }
 
 std::string reference_table(const StudySummary& summary) {
-  const auto row = [](const char* title, const StudyReference& r) {
-    return std::string("<tr><td>") + title + "</td>" + cell(r.stable, 100.0) + cell(r.pct) + cell(r.deg) + "</tr>\n";
+  const auto row = [](const std::string& title, const StudyReference& r) {
+    return "<tr><td>" + html_escaped(title) + "</td>" + cell(r.stable, 100.0) + cell(r.pct) + cell(r.deg) + "</tr>\n";
   };
-  return "<div class=\"wide\"><table>\n<thead><tr><th>Reference</th><th>stand, %</th><th>displacement, %</th>"
+  std::string by_task;
+  for (const auto& [task, reference] : summary.ground_truth_by_task)
+    by_task += row("True scene given to the model: " + task, reference);
+  return "<div class=\"scroll\"><table>\n<thead><tr><th>Reference</th><th>stand, %</th><th>displacement, %</th>"
          "<th>displacement, °</th></tr></thead>\n<tbody>" +
-         row("True scene given to the model", summary.ground_truth) + row("Random placement", summary.random) +
-         "</tbody></table></div>\n";
+         row("True scene given to the model", summary.ground_truth) + by_task +
+         row("Random placement", summary.random) + "</tbody></table></div>\n";
 }
 
 std::string summary_tables(const StudySummary& summary) {
@@ -118,7 +119,7 @@ std::string comparison(const StudySummary& summary) {
 // Besides the reports' common style: tables that scroll on a narrow screen, and what print needs.
 constexpr const char* kStyle = R"(<style>
   figure { margin: 14px 0; overflow-x: auto; } figure svg { width: 100%; min-width: 640px; height: auto; }
-  .wide { overflow-x: auto; }
+  .scroll { overflow-x: auto; }
   td { white-space: nowrap; } td:first-child { white-space: normal; min-width: 13em; } td small { color: var(--soft); }
   thead tr:last-child > * { border-bottom: 2px solid var(--ink); } table { margin: 10px 0 18px; }
   @media print { body { background: none; } main { padding: 0; } h2 { break-after: avoid; }

@@ -41,10 +41,14 @@ const std::vector<Quantity>& medians() {
 
 std::optional<double> share_of(bool yes) { return yes ? 1.0 : 0.0; }
 
+Quantity stable_true() {
+  return {"stable_true", [](const StudyRow& r) { return share_of(r.stable_true.value_or(false)); }};
+}
+
 const std::vector<Quantity>& shares() {
   static const std::vector<Quantity> list = {
       {"stable_recovered", [](const StudyRow& r) { return share_of(r.stable_recovered.value_or(false)); }},
-      {"stable_true", [](const StudyRow& r) { return share_of(r.stable_true.value_or(false)); }},
+      stable_true(),
       {"objects_right", [](const StudyRow& r) { return share_of(r.objects_found == r.objects_true); }},
       {"shapes_right",
        [](const StudyRow& r) {
@@ -78,13 +82,24 @@ Estimate mean_of(const Rows& rows, const Quantity& quantity, Rng& rng) {
   return {mean, bootstrap_mean(values, rng), static_cast<int>(values.size())};
 }
 
-StudyPoint point_of(const Rows& rows, double noise_scale, const StudyCondition& condition, Rng& rng) {
+// The rows of each of the configuration's tasks, by title; scene i has task i modulo their number.
+std::map<std::string, Rows> by_task(const Rows& rows, const StudyConfig& config) {
+  std::map<std::string, Rows> parts;
+  for (const StudyRow& row : rows)
+    parts[task_title(config.tasks[static_cast<std::size_t>(row.scene) % config.tasks.size()])].push_back(row);
+  return parts;
+}
+
+StudyPoint point_of(const Rows& rows, double noise_scale, const StudyConfig& config, const StudyCondition& condition,
+                    Rng& rng) {
   StudyPoint point;
   point.noise_scale = noise_scale;
   point.depth_sigma_mm = depth_sigma_mm(condition, noise_scale);
   point.trials = static_cast<int>(rows.size());
   for (const Quantity& quantity : medians()) point.medians[quantity.name] = median_of(rows, quantity, rng);
   for (const Quantity& quantity : shares()) point.shares[quantity.name] = mean_of(rows, quantity, rng);
+  for (const StudyTask& task : config.tasks) point.stable_by_task[task_title(task)] = mean_of({}, stable_true(), rng);
+  for (const auto& [task, part] : by_task(rows, config)) point.stable_by_task[task] = mean_of(part, stable_true(), rng);
   for (const std::string& failure : failure_names()) point.failures[failure] = 0.0;
   for (const StudyRow& row : rows) {
     if (!row.failure.empty()) point.failures[row.failure] += 1.0 / static_cast<double>(rows.size());
@@ -126,6 +141,7 @@ nlohmann::ordered_json to_json(const StudyPoint& point) {
       {"noise_scale", point.noise_scale}, {"depth_sigma_mm", point.depth_sigma_mm}, {"trials", point.trials}};
   for (const Quantity& q : medians()) json[q.name] = to_json(point.medians.at(q.name), "median");
   for (const Quantity& q : shares()) json[q.name] = to_json(point.shares.at(q.name), "share");
+  for (const auto& [task, share] : point.stable_by_task) json["stable_true_by_task"][task] = to_json(share, "share");
   for (const std::string& failure : failure_names()) json["failures"][failure] = point.failures.at(failure);
   return json;
 }
@@ -146,7 +162,7 @@ StudySummary summarise(const std::vector<StudyRow>& rows, const StudyConfig& con
         const bool here = std::abs(row.noise_scale - scale) <= 1e-5 * std::max(1.0, scale);
         if (here && row.series == static_cast<int>(s)) chosen.push_back(row);
       }
-      if (!chosen.empty()) series.points.push_back(point_of(chosen, scale, config.series[s], rng));
+      if (!chosen.empty()) series.points.push_back(point_of(chosen, scale, config, config.series[s], rng));
     }
   }
   Rows scenes;
@@ -157,6 +173,9 @@ StudySummary summarise(const std::vector<StudyRow>& rows, const StudyConfig& con
   summary.scenes = static_cast<int>(scenes.size());
   summary.ground_truth = ground_truth_of(scenes, rng);
   summary.random = random_of(scenes, rng);
+  if (config.tasks.size() > 1)
+    for (const auto& [task, part] : by_task(scenes, config))
+      summary.ground_truth_by_task[task] = ground_truth_of(part, rng);
   return summary;
 }
 
@@ -165,6 +184,8 @@ nlohmann::ordered_json to_json(const StudySummary& summary, const std::string& s
   json["trials"] = summary.trials;
   json["scenes"] = summary.scenes;
   json["references"] = {{"ground_truth", to_json(summary.ground_truth)}, {"random", to_json(summary.random)}};
+  for (const auto& [task, reference] : summary.ground_truth_by_task)
+    json["references"]["ground_truth_by_task"][task] = to_json(reference);
   json["series"] = nlohmann::ordered_json::array();
   for (const StudySeries& series : summary.series) {
     nlohmann::ordered_json points = nlohmann::ordered_json::array();

@@ -26,7 +26,8 @@ struct StudyPoint {
   int trials = 0;
   std::map<std::string, Estimate> medians;  // by column of trials.csv
   std::map<std::string, Estimate> shares;   // 0 … 1: stable_recovered, stable_true, objects_right, shapes_right
-  std::map<std::string, double> failures;   // 0 … 1, by failure_names(); with the share of stable_true they make 1
+  std::map<std::string, Estimate> stable_by_task;  // 0 … 1, of stable_true, by task_title()
+  std::map<std::string, double> failures;  // 0 … 1, by failure_names(); with the share of stable_true they make 1
 };
 
 struct StudySeries {
@@ -43,6 +44,7 @@ struct StudySummary {
   int trials = 0, scenes = 0;
   std::vector<StudySeries> series;  // as in the configuration
   StudyReference ground_truth, random;
+  std::map<std::string, StudyReference> ground_truth_by_task;  // by task_title()
 
   const std::vector<StudyPoint>& base() const { return series.front().points; }
 };

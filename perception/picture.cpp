@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include <opencv2/imgcodecs.hpp>
+
 #include "perception/png.h"
 #include "stability/files.h"
 
@@ -187,6 +189,20 @@ Camera zoomed_on(const Camera& camera, const Pose& T_world_camera, const std::ve
 std::string to_png(const ColourImage& image) {
   if (image.pixels.empty()) throw std::invalid_argument("a picture without pixels");
   return encode_rgb_png(image.pixels.front().data(), image.width, image.height);
+}
+
+std::string to_jpeg(const ColourImage& image) {
+  if (image.pixels.empty()) throw std::invalid_argument("a picture without pixels");
+  cv::Mat bgr(image.height, image.width, CV_8UC3);
+  for (int v = 0; v < image.height; ++v) {
+    for (int u = 0; u < image.width; ++u) {
+      const Rgb& rgb = image.at(v, u);
+      bgr.at<cv::Vec3b>(v, u) = {rgb[2], rgb[1], rgb[0]};
+    }
+  }
+  std::vector<std::uint8_t> bytes;
+  cv::imencode(".jpg", bgr, bytes, {cv::IMWRITE_JPEG_QUALITY, 88});
+  return {bytes.begin(), bytes.end()};
 }
 
 void write_picture(const ColourImage& image, const std::string& path) { write_file(path, to_png(image)); }

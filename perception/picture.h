@@ -55,6 +55,7 @@ Camera resized(const Camera& camera, double factor);
 Camera zoomed_on(const Camera& camera, const Pose& T_world_camera, const std::vector<Scene>& shown, int width);
 
 std::string to_png(const ColourImage& image);  // the file's bytes; throws std::invalid_argument without pixels
+std::string to_jpeg(const ColourImage& image);  // likewise; a tenth of the size where a picture is shaded
 void write_picture(const ColourImage& image, const std::string& path);  // throws InputError naming the file
 
 }  // namespace dofusion

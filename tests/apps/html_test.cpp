@@ -19,7 +19,9 @@ TEST(Base64, TestVectorsOfRfc4648) {
 
 TEST(Html, TextCannotBecomeMarkup) {
   EXPECT_EQ(html_escaped("<a href=\"x\">&</a>"), "&lt;a href=&quot;x&quot;&gt;&amp;&lt;/a&gt;");
-  EXPECT_THAT(png_image("x", "\"><script>"), testing::Not(testing::HasSubstr("<script>")));
+  EXPECT_THAT(embedded_image("\xff\xd8x", "a"), testing::HasSubstr("data:image/jpeg;base64,/9h4"));
+  EXPECT_THAT(embedded_image("\x89PNG", "a"), testing::HasSubstr("data:image/png;base64,"));
+  EXPECT_THAT(embedded_image("x", "\"><script>"), testing::Not(testing::HasSubstr("<script>")));
   EXPECT_THAT(html_begin("a<b"), testing::HasSubstr("<title>a&lt;b</title>"));
 }
 

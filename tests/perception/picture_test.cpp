@@ -124,6 +124,13 @@ TEST(Picture, ZoomedCameraFramesTheScene) {
   EXPECT_EQ(zoomed_on(kCamera, view(), {}, 80).fx, 150.0);
 }
 
+TEST(Picture, JpegIsOne) {
+  const std::string bytes = to_jpeg(ColourImage(16, 8, {200, 100, 50}));
+  EXPECT_EQ(bytes.substr(0, 2), "\xff\xd8");
+  EXPECT_EQ(bytes.substr(bytes.size() - 2), "\xff\xd9");
+  EXPECT_THROW(to_jpeg(ColourImage()), std::invalid_argument);
+}
+
 TEST(Picture, PngIsAnRgbImageOfTheSize) {
   const TemporaryDirectory directory;
   const ColourImage picture(7, 5, {10, 20, 30});
