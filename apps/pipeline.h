@@ -22,7 +22,7 @@ struct SceneRecoveryOptions {
 
 struct RecoveredScene {
   std::optional<Table> table;              // none: no table was found, and nothing else is set
-  std::vector<View> views;                 // as given, on the table: its world is theirs
+  std::vector<View> views;                 // as given and segmented, on the table: its world is theirs
   LabelImage labels;                       // 0 nothing, 1 table, 2 + i objects[i]
   std::vector<RecoveredObject> objects;    // at the poses of `scene`
   std::vector<std::vector<float>> seen;    // of unknown objects: shares of the mesh's triangles (seen_surface.h)

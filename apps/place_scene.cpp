@@ -5,14 +5,15 @@
 
 #include <Eigen/Geometry>
 
+#include "perception/known_recovery.h"
 #include "perception/picture.h"
 #include "perception/seen_surface.h"
 
 namespace dofusion {
 namespace {
 
-constexpr std::size_t kMostPoints = 20000;  // of the readings: 0.4 MB in the page
-constexpr double kMostPixels = 640 * 480;   // that are looked at for them
+constexpr std::size_t kMostPoints = 20000;  // of all readings: 0.4 MB in the page
+constexpr double kMostPixels = 640 * 480;   // of a view that are looked at for them
 constexpr double kTableMargin = 0.12;       // metres of table around the objects
 constexpr double kMostAside = 0.6;          // metres of table beyond that for what rolls away
 constexpr double kMostHeight = 1.0;         // metres above the table; readings beyond are of something else
@@ -69,24 +70,34 @@ GltfMesh table_mesh(const Eigen::AlignedBox2d& stage, const std::vector<Settling
   return mesh;
 }
 
-// Every k-th valid reading above the stage; of large images, those of a coarser grid of pixels.
-GltfMesh observed_mesh(const PlaceInputs& inputs, const PlaceResult& result, const Eigen::AlignedBox2d& box,
-                       std::size_t material) {
-  const Pose& T_world_camera = result.recovered.table->T_world_camera;
-  const double pixels = static_cast<double>(inputs.depth.width) * inputs.depth.height;
+// A view's valid readings above the stage, in their objects' colours; of large images, those of a coarser grid of
+// pixels.
+void add_readings(const View& view, const LabelImage& labels, const Eigen::AlignedBox2d& box, GltfMesh& mesh) {
+  const double pixels = static_cast<double>(view.depth.width) * view.depth.height;
   const int stride = static_cast<int>(std::ceil(std::sqrt(pixels / kMostPixels)));
-  GltfMesh all;
-  for (int v = 0; v < inputs.depth.height; v += stride) {
-    for (int u = 0; u < inputs.depth.width; u += stride) {
-      const double z = inputs.depth.at(v, u);
+  for (int v = 0; v < view.depth.height; v += stride) {
+    for (int u = 0; u < view.depth.width; u += stride) {
+      const double z = view.depth.at(v, u);
       if (!(z > 0.0) || !std::isfinite(z)) continue;
-      const Eigen::Vector3d p = T_world_camera * unproject(inputs.camera, u, v, z);
+      const Eigen::Vector3d p = view.T_world_camera * unproject(view.camera, u, v, z);
       if (!box.contains(p.head<2>().eval()) || std::abs(p.z()) > kMostHeight) continue;
-      const int label = result.recovered.labels.at(v, u);
+      const int label = labels.at(v, u);
       const Rgb colour = label < kLabelFirstObject ? kTableColour : object_colour(label - kLabelFirstObject);
-      all.vertices.push_back(p.cast<float>());
-      all.colours.push_back(mixed(colour, {0, 0, 0}, 0.5));  // darker than the surfaces that they lie on
+      mesh.vertices.push_back(p.cast<float>());
+      mesh.colours.push_back(mixed(colour, {0, 0, 0}, 0.5));  // darker than the surfaces that they lie on
     }
+  }
+}
+
+// The readings of all views, thinned out evenly.
+GltfMesh observed_mesh(const RecoveredScene& recovered, const Eigen::AlignedBox2d& box, std::size_t material) {
+  GltfMesh all;
+  for (const View& view : recovered.views) {
+    const bool first = &view == &recovered.views.front();
+    add_readings(view,
+                 first ? recovered.labels
+                       : label_recovered(view.depth, view.camera, table_of(view), view.labels, recovered.objects),
+                 box, all);
   }
   GltfMesh thinned;
   thinned.point_material = material;
@@ -108,7 +119,7 @@ class Builder {
     for (std::size_t i = 0; i < result_.recovered.objects.size(); ++i) add_object(i);
     if (!result_.placements.empty()) add_query();
     const std::size_t of_points = add_material("observed", {255, 255, 255}, false);
-    scene_.nodes.push_back({"observed", Pose::Identity(), observed_mesh(inputs_, result_, box, of_points)});
+    scene_.nodes.push_back({"observed", Pose::Identity(), observed_mesh(result_.recovered, box, of_points)});
     for (std::size_t k = 0; k < motions.size(); ++k) add_motion("rank " + std::to_string(k + 1), motions[k]);
     const Camera& camera = inputs_.camera;
     scene_.camera = GltfCamera{"depth camera", result_.recovered.table->T_world_camera,

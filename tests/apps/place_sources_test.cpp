@@ -1,5 +1,6 @@
 // dofusion-place on several views and on frames of a BOP dataset.
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 
 #include "perception/depth_io.h"
@@ -45,8 +46,8 @@ class PlaceSourcesTest : public PlaceTest {
       const double azimuth = name == "a" ? 0.3 : 2.5;
       const Pose T_world_camera =
           look_at({0.5 * std::cos(azimuth), 0.5 * std::sin(azimuth), 0.45}, scene_centre(scene));
-      write_depth(make_synthetic_view(scanner.render(camera, T_world_camera), camera, T_world_camera, {}, rng).depth, camera,
-                  file(name + ".png"));
+      write_depth(make_synthetic_view(scanner.render(camera, T_world_camera), camera, T_world_camera, {}, rng).depth,
+                  camera, file(name + ".png"));
       write_file(file(name + ".json"), json{{"T_world_camera", rows_of(T_world_camera)}}.dump());
     }
   }
@@ -57,12 +58,28 @@ class PlaceSourcesTest : public PlaceTest {
     std::vector<std::string> words = view("a");
     for (const std::string& word : view("b")) words.push_back(word);
     words.insert(words.end(), more.begin(), more.end());
-    for (const char* word : {"--query", "cube", "--samples", "4", "--steps", "10", "--threads", "2"}) words.push_back(word);
+    for (const char* word : {"--query", "cube", "--samples", "4", "--steps", "10", "--threads", "2"})
+      words.push_back(word);
     words.push_back("--out");
     words.push_back(out());
     return run_command("dofusion-place", words);
   }
 };
+
+// Readings that scene.glb shows.
+int shown_readings(const std::string& out) {
+  const std::string file = read_file(out + "/scene.glb");
+  std::uint32_t length = 0;
+  std::memcpy(&length, file.data() + 12, sizeof length);
+  const json gltf = json::parse(file.substr(20, length));
+  for (const json& node : gltf.at("nodes")) {
+    if (node.at("name") != "observed") continue;
+    const json& attributes =
+        gltf.at("meshes").at(node.at("mesh").get<std::size_t>()).at("primitives").at(0).at("attributes");
+    return gltf.at("accessors").at(attributes.at("POSITION").get<std::size_t>()).at("count");
+  }
+  return 0;
+}
 
 TEST_F(PlaceSourcesTest, TwoViewsGiveOneSceneInTheirFrame) {
   write_views();
@@ -72,6 +89,10 @@ TEST_F(PlaceSourcesTest, TwoViewsGiveOneSceneInTheirFrame) {
     expect_at_the_truth(placements(), two_blocks());
     EXPECT_EQ(count_objects(segmentation(small_camera())), 2);
   }
+  const int of_both = shown_readings(out());
+  std::filesystem::remove_all(out());
+  expect_success(place({"--camera", file("camera.json"), "--depth", file("a.png")}));
+  EXPECT_GT(of_both, 1.1 * shown_readings(out()));  // twice as many, of which every other one is shown
 }
 
 TEST_F(PlaceSourcesTest, BadViewsAreRefused) {
@@ -91,8 +112,10 @@ TEST_F(PlaceSourcesTest, BadViewsAreRefused) {
 }
 
 TEST_F(PlaceSourcesTest, FramesOfADatasetThatDofusionScanWrote) {
-  expect_success(run_command("dofusion-scan", {"--objects", "2", "--count", "1", "--cameras", "3", "--seed", "12", "--out", file("bop")}));
-  const std::vector<std::string> common = {"--query", "hat", "--samples", "4", "--steps", "10", "--out", out(), "--bop", file("bop")};
+  expect_success(run_command(
+      "dofusion-scan", {"--objects", "2", "--count", "1", "--cameras", "3", "--seed", "12", "--out", file("bop")}));
+  const std::vector<std::string> common = {"--query", "hat",   "--samples", "4",     "--steps",
+                                           "10",      "--out", out(),       "--bop", file("bop")};
   const auto place_bop = [&](const std::vector<std::string>& more) {
     std::vector<std::string> words = common;
     words.insert(words.end(), more.begin(), more.end());
@@ -103,7 +126,8 @@ TEST_F(PlaceSourcesTest, FramesOfADatasetThatDofusionScanWrote) {
   EXPECT_TRUE(one.contains("T_given_world"));
   ASSERT_EQ(one.at("objects").size(), 2u);
   EXPECT_TRUE(one.at("objects").at(0).at("known").get<bool>());
-  EXPECT_LT(pose_from_json(one.at("T_given_world")).translation().z(), 0.002);  // the dataset's world has its table at 0
+  EXPECT_LT(pose_from_json(one.at("T_given_world")).translation().z(),
+            0.002);  // the dataset's world has its table at 0
   expect_success(place_bop({"--image", "0", "--image", "1", "--image", "2"}));
   EXPECT_EQ(placements().at("objects").size(), 2u);
   expect_refusal(place_bop({"--image", "9"}), {"scene_camera.json", "no image 9"});
